@@ -184,12 +184,13 @@ def read_log(source: Source, settings: ImportMap, map_path: Path) -> Log:
                 " ... in the map, or rename one in the file"
             )
         if name not in source.names:
+            # Names that were numbered for want of a header explain the most.
+            reason = "; ".join(source.remarks) or suggestion(name, list(source.names))
             raise SettingsError(
-                f"has no column {name!r}, which {where} in {map_path} names;"
-                f" {suggestion(name, list(source.names))}"
+                f"has no column {name!r}, which {where} in {map_path} names; {reason}"
             )
     columns = source.load(list(needed))
-    findings: list[Finding] = []
+    findings = [Finding("rows", remark, "") for remark in source.remarks]
     note = noting("time", findings)
     if settings.time.column is None:
         # The longest, as constants have one row.

@@ -6,22 +6,21 @@ import re
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
+from itertools import pairwise
 
 from pipelines.errors import InputError
+from pipelines.importing.sources.header import Header, header
 from pipelines.settings.base import repeated
 from pipelines.settings.import_map import SourceSettings
-from pipelines.settings.units import unit_named
 
 DELIMITERS = ",;\t| "
 RARE = re.compile(r"[^\w\s.+\-:/\"'#%,;|\0]")
 """Other delimiters, tried where none of ``DELIMITERS`` gives a table."""
-COMMENTS = ("#", "%")
+FEWEST = 10
+"""Least number of rows of a table; fewer are facts about it."""
+COMMENTS = ("#", "%", "//")
 BYTE_ORDER_MARKS = {b"\xef\xbb\xbf": "utf-8-sig", b"\xff\xfe": "utf-16", b"\xfe\xff": "utf-16"}
 NOT_A_NUMBER = {"", "nan", "null", "none", "na", "n/a", "inf", "-inf", "-nan", "true", "false"}
-
-UNIT = r"[\[(].*[\])]|[-\w°µ/·*%.²]{1,5}"
-"""Pattern of a possible unknown unit: in brackets, or short."""
 
 
 @dataclass(frozen=True)
@@ -35,7 +34,14 @@ class Dialect:
     rows_before: int
     """Lines before the first one of data."""
     names: tuple[str, ...]
+    numeric: frozenset[str]
+    """Columns of numbers."""
+    heads: tuple[frozenset[str], ...]
+    """Words above each column, by which a header that comes again is recognised."""
+    units: dict[str, str]
     notes: tuple[str, ...]
+    remark: str
+    """How the names follow from a header that does not fit; empty where it does."""
 
     @property
     def separator(self) -> str:
@@ -49,22 +55,26 @@ class Dialect:
         return f"{named} between fields and decimal {self.decimal!r}"
 
 
-def find_dialect(path: Path, settings: SourceSettings) -> Dialect:
-    """Derive the dialect of a text file from its first lines, as far as it is not given.
+def find_dialect(start: bytes, whole: bool, settings: SourceSettings) -> Dialect:
+    """Derive the dialect of a text from its beginning, as far as it is not given.
+
+    Parameters
+    ----------
+    start : bytes
+        Beginning of the text.
+    whole : bool
+        Whether that is all of it.
+    settings : SourceSettings
+        What the map says about the text.
 
     Raises
     ------
     InputError
-        If the file is no text, or has no table of numbers.
+        If it is no text, or has no table of numbers.
     """
-    # Bytes at the beginning of a file from which its dialect is derived.
-    looked_at = 2**16
-    with open(path, "rb") as file:
-        start = file.read(looked_at)
-        whole = not file.read(1)
     encoding = settings.encoding or _encoding(start)
     try:
-        lines = start.decode(encoding, errors="replace").splitlines()
+        lines = re.split(r"\r\n?|\n", start.decode(encoding, errors="replace"))
     except LookupError as error:
         raise InputError(
             f"source.encoding: found {encoding!r}, expected one such as utf-8"
@@ -80,13 +90,15 @@ def find_dialect(path: Path, settings: SourceSettings) -> Dialect:
         raise InputError(_no_table(lines, settings))
     # A wrong delimiter leaves several numbers in one field, which is then none.
     table = max(tables, key=lambda table: table.fields_of_numbers)
-    names = settings.columns or table.header(below)
-    if len(names) != table.width:
+    table.refuse_second()
+    named = table.header(below)
+    names = settings.columns or named.names
+    if len(names) < table.width:
         raise InputError(
             f"has {table.width} columns, but source.columns names {len(names)}; name each of them"
         )
     notes = [f"delimiter {table.delimiter!r}, decimal {table.decimal!r}, {encoding}"]
-    if names == table.numbered:
+    if names[0] == "c1" and not named.remark:
         notes.append("no header: columns are named c1, c2, ...")
     starts = Counter(line.lstrip()[:1] for line in lines)
     comment = settings.comment or next((mark for mark in COMMENTS if starts[mark]), None)
@@ -95,14 +107,20 @@ def find_dialect(path: Path, settings: SourceSettings) -> Dialect:
         notes.append(
             f"columns with the same name are {', '.join(f'{name}#1, {name}#2' for name in twice)}"
         )
+    apart = _numbered_twins(names)
+    remark = "" if settings.columns else named.remark
     return Dialect(
         encoding,
         table.delimiter,
         table.decimal,
         comment,
         skipped + table.first,
-        _numbered_twins(names),
-        tuple(notes),
+        apart,
+        frozenset(apart[k] for k in table.numeric),
+        table.heads(below),
+        named.units,
+        (*notes, remark) if remark else tuple(notes),
+        remark,
     )
 
 
@@ -111,6 +129,9 @@ def _encoding(start: bytes) -> str:
         if start.startswith(mark):
             return encoding
     nuls = start.count(b"\0")
+    for first, encoding in ((0, "utf-16-be"), (1, "utf-16-le")):
+        if nuls > 0.9 * (len(start) // 2) == start[first::2].count(b"\0"):
+            return encoding
     if nuls and not _is_stray(nuls, start):
         raise InputError(
             f"is in no known format (it starts with {start[:8]!r}); export it as text, .mat,"
@@ -151,38 +172,52 @@ class _Table:
 
     delimiter: str
     decimal: str
-    comment_marks: tuple[str, ...]
-    first: int
-    """Line of the first row."""
+    marks: tuple[str, ...]
+    """Of comments."""
+    blocks: tuple[tuple[tuple[int, list[str]], ...], ...]
+    """Rows under one header each, with their lines' numbers, the longest block first."""
     width: int
-    fields_of_numbers: int
+    numeric: tuple[int, ...]
+    """Columns of numbers."""
 
     @property
-    def numbered(self) -> tuple[str, ...]:
-        """Names of columns without a header."""
-        return tuple(f"c{k + 1}" for k in range(self.width))
+    def first(self) -> int:
+        """Line of the first row."""
+        return self.blocks[0][0][0]
 
-    def header(self, lines: Sequence[str]) -> tuple[str, ...]:
-        """Return the names above the rows: the last line with as many fields as a row.
+    @property
+    def fields_of_numbers(self) -> int:
+        """How many fields of the rows are numbers."""
+        return sum(_is_number(field, self.decimal) for _, row in self.blocks[0] for field in row)
 
-        If that line holds units, they are appended to the names in the line before.
-        """
+    def header(self, lines: Sequence[str]) -> Header:
+        """Return the names above the rows."""
+        counters = [row[0] for _, row in self.blocks[0]]
+        counts_rows = all(field.isdigit() for field in counters) and all(
+            int(after) == int(before) + 1 for before, after in pairwise(counters)
+        )
+        return header(self._above(lines), self.width, counts_rows)
+
+    def heads(self, lines: Sequence[str]) -> tuple[frozenset[str], ...]:
+        """Return the words above each column."""
+        above = self._above(lines)
+        widest = max(map(len, above), default=0)
+        return tuple(frozenset(line[k] for line in above if k < len(line)) for k in range(widest))
+
+    def _above(self, lines: Sequence[str]) -> list[list[str]]:
         # Many tools write the header as a comment, so its mark is removed.
-        above = [
-            _fields(line.lstrip("".join(self.comment_marks) + " "), self.delimiter)
-            for line in lines[: self.first]
-        ]
-        fitting = [fields for fields in above if len(fields) == self.width and any(fields)]
-        if not fitting:
-            return self.numbered
-        names, *before = reversed(fitting)
-        names = [name or number for name, number in zip(names, self.numbered, strict=True)]
-        if before and all(unit_named(field) or re.fullmatch(UNIT, field) for field in names):
-            names = [
-                f"{name} [{unit.strip('[]()')}]"
-                for name, unit in zip(before[0], names, strict=True)
-            ]
-        return tuple(names)
+        strip = "".join(self.marks) + " "
+        return [_fields(line.lstrip(strip), self.delimiter) for line in lines[: self.first]]
+
+    def refuse_second(self) -> None:
+        """Raise InputError where another table of some length has another header."""
+        others = [block for block in self.blocks[1:] if len(block) >= FEWEST]
+        if others:
+            first, second = sorted([self.blocks[0][0][0], others[0][0][0]])
+            raise InputError(
+                f"holds two tables, with rows from lines {first + 1} and {second + 1} on; save"
+                " each as a file of its own"
+            )
 
 
 def _tables(
@@ -194,8 +229,8 @@ def _tables(
     tables = [
         _table(lines, delimiter, decimal, marks)
         for delimiter in delimiters
-        # A comma cannot separate fields and be the decimal point, too.
-        for decimal in settings.decimal or ("." if delimiter == "," else ".,")
+        # A comma may separate fields and be the decimal point of quoted numbers.
+        for decimal in settings.decimal or ".,"
     ]
     return [table for table in tables if table is not None]
 
@@ -206,20 +241,50 @@ def _table(
     rows = [
         (k, _fields(line, delimiter))
         for k, line in enumerate(lines)
-        if not line.lstrip().startswith(marks)
+        if line.strip() and not line.lstrip().startswith(marks)
     ]
-    data = [(k, fields) for k, fields in rows if _are_numbers(fields, decimal)]
+    data = [fields for _, fields in rows if _are_numbers(fields, decimal)]
     if not data:
         return None
-    width = Counter(len(fields) for _, fields in data).most_common(1)[0][0]
-    data = [(k, fields) for k, fields in data if len(fields) == width]
-    numbers = sum(_is_number(field, decimal) for _, fields in data for field in fields)
-    return _Table(delimiter, decimal, marks, data[0][0], width, numbers) if width > 1 else None
+    width = Counter(map(len, data)).most_common(1)[0][0]
+    data = [fields for fields in data if len(fields) >= width]
+    numeric = tuple(
+        k
+        for k in range(width)
+        if 2 * sum(_is_number(fields[k], decimal) for fields in data) > len(data)
+    )
+    # An empty last field is no field, where every row has one.
+    while width > 1 and not any(field for fields in data for field in fields[width - 1 :]):
+        width -= 1
+    blocks = _blocks(rows, width, numeric, decimal)
+    if width < 2 or not blocks:
+        return None
+    return _Table(delimiter, decimal, marks, blocks, width, numeric)
+
+
+def _blocks(
+    rows: Sequence[tuple[int, list[str]]], width: int, numeric: Sequence[int], decimal: str
+) -> tuple[tuple[tuple[int, list[str]], ...], ...]:
+    """Return the rows of data between lines of words, the longest block first.
+
+    Lines of words that have come before, as a header that is repeated, end no block.
+    """
+    blocks: list[list[tuple[int, list[str]]]] = [[]]
+    heads: set[tuple[str, ...]] = set()
+    for k, fields in rows:
+        inside = [fields[column] for column in numeric if column < len(fields)]
+        numbers = [_looks_like_number(field) for field in inside if not _is_missing(field)]
+        if len(fields) >= width and all(numbers) and _are_numbers(fields, decimal):
+            blocks[-1].append((k, fields))
+        elif len(numbers) > 1 and not any(numbers) and tuple(fields) not in heads:
+            heads.add(tuple(fields))
+            blocks.append([])
+    return tuple(tuple(block) for block in sorted(blocks, key=len, reverse=True) if block)
 
 
 def _fields(line: str, delimiter: str) -> list[str]:
     if delimiter == " ":
-        return line.split()
+        line = line.replace("\t", " ").strip()
     return [
         field.strip()
         for field in next(csv.reader([line], delimiter=delimiter, skipinitialspace=True), [])
@@ -230,14 +295,28 @@ def _are_numbers(fields: list[str], decimal: str) -> bool:
     # Least share of numbers among the fields of a row of data; others are dates and states.
     enough = 0.5
     numbers = sum(_is_number(field, decimal) for field in fields)
-    return numbers >= 2 and numbers >= enough * sum(
-        field.lower() not in NOT_A_NUMBER for field in fields
-    )
+    return numbers >= 2 and numbers >= enough * sum(not _is_missing(field) for field in fields)
+
+
+def _is_missing(field: str) -> bool:
+    return field.lower() in NOT_A_NUMBER
 
 
 def _is_number(field: str, decimal: str) -> bool:
-    point = re.escape(decimal)
-    return re.fullmatch(rf"[-+]?(\d+({point}\d*)?|{point}\d+)([eE][-+]?\d+)?", field) is not None
+    # Marks between thousands only with a decimal point: otherwise they may be decimal ones.
+    point, mark = re.escape(decimal), "," if decimal == "." else r"\."
+    return (
+        re.fullmatch(
+            rf"[-+]?(\d+({point}\d*)?|{point}\d+|\d{{1,3}}({mark}\d{{3}})+{point}\d+)"
+            r"([eE][-+]?\d+)?",
+            field,
+        )
+        is not None
+    )
+
+
+def _looks_like_number(field: str) -> bool:
+    return re.fullmatch(r"[-+]?[\d.,]*\d[\d.,]*([eE][-+]?\d+)?", field) is not None
 
 
 def _numbered_twins(names: Sequence[str]) -> tuple[str, ...]:

@@ -1,28 +1,108 @@
 """Columns of nested content, with plain names: ``hip.position``, ``q[0]``."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from math import prod
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from pipelines.importing.sources.source import Columns
+from pipelines.importing.sources.source import Columns, Source
+
+Leaves = dict[str, np.ndarray]
+"""Arrays of any shape in nested content, by their path."""
+LABELS = ("name", "label", "title", "signalname", "blockname")
+"""Fields of a record that name its signal, in lower case."""
 
 
-def flattened(content: Any, name: str = "") -> Columns:
-    """Return every array (n,) of numbers or text in nested content; other values are left out."""
-    return dict(_columns(content, name))
+def nested_source(
+    path: Path, format: str, leaves: Leaves, notes: tuple[str, ...] = (), **more: Any
+) -> Source:
+    """Return a log of the arrays in nested content.
+
+    Time runs along the axis that is as long as a vector in the content, or else the longest.
+    """
+    lengths = vector_lengths(array.shape for array in leaves.values())
+    columns = {
+        column: values
+        for name, array in leaves.items()
+        for column, values in columns_of(array, name, lengths).items()
+    }
+    notes = (*notes, *turned({name: a.shape for name, a in leaves.items()}, lengths))
+    return Source.in_memory(path, format, columns, notes=notes, **more)
 
 
-def _columns(content: Any, name: str) -> Iterator[tuple[str, np.ndarray]]:
+def leaves_of(content: Any, name: str = "") -> Leaves:
+    """Return every array of numbers or text in nested content; other values are left out."""
+    return dict(_leaves(content, name))
+
+
+def vector_lengths(shapes: Iterable[tuple[int, ...]]) -> frozenset[int]:
+    """Return the lengths of vectors among arrays of these shapes."""
+    return frozenset(max(shape) for shape in shapes if shape and _is_vector(shape))
+
+
+def columns_of(array: np.ndarray, name: str, lengths: Collection[int]) -> Columns:
+    """Return the columns of an array that may have several, (n,) each.
+
+    Parameters
+    ----------
+    array : array
+        Samples along any axis; fields of a structured array are columns of their own.
+    name : str
+        Its path.
+    lengths : collection of int
+        Lengths of vectors in the same content, one of which may be the clock.
+    """
+    if array.dtype.names:
+        return {
+            column: values
+            for part in array.dtype.names
+            for column, values in columns_of(
+                array[part], f"{name}.{part}" if name else part, lengths
+            ).items()
+        }
+    if array.dtype.kind not in "biufOUSmM":
+        return {}
+    # A vector in any orientation: MATLAB's are matrices with one row or one column.
+    if _is_vector(array.shape):
+        return {name: array.reshape(-1)}
+    axis = _time_axis(array.shape, lengths)
+    flat = np.moveaxis(array, axis, 0).reshape(array.shape[axis], -1)
+    return {f"{name}[{k}]": flat[:, k] for k in range(prod(flat.shape[1:]))}
+
+
+def turned(shapes: Mapping[str, tuple[int, ...]], lengths: Collection[int]) -> list[str]:
+    """Return a note on the arrays whose samples lie along another axis than the first."""
+    names = [
+        f"{name} ({' x '.join(map(str, shape))})"
+        for name, shape in shapes.items()
+        if not _is_vector(shape) and _time_axis(shape, lengths)
+    ]
+    more = f" and {len(names) - 5} more" if len(names) > 5 else ""
+    return [f"time along the longer side of {', '.join(names[:5])}{more}"] if names else []
+
+
+def _is_vector(shape: tuple[int, ...]) -> bool:
+    return max(shape, default=1) == prod(shape)
+
+
+def _time_axis(shape: tuple[int, ...], lengths: Collection[int]) -> int:
+    """Return the axis of time: as long as a vector in the content, or else the longest."""
+    axes = [axis for axis, length in enumerate(shape) if length in lengths]
+    return max(axes or range(len(shape)), key=lambda axis: shape[axis])
+
+
+def _leaves(content: Any, name: str) -> Iterator[tuple[str, np.ndarray]]:
     if isinstance(content, Mapping):
         for key, value in content.items():
-            yield from _columns(value, f"{name}.{key}" if name else str(key))
+            yield from _leaves(value, f"{name}.{key}" if name else str(key))
     elif is_list_of_records(content):
-        for key, values in _transposed(content).items():
-            yield from _columns(values, f"{name}.{key}" if name else str(key))
+        parts = _signals(content) if _are_signals(content) else _transposed(content)
+        for key, values in parts.items():
+            yield from _leaves(values, f"{name}.{key}" if name else str(key))
     elif isinstance(content, Sequence | np.ndarray | int | float | str) or content is None:
-        yield from _numbered(_array(content), name)
+        yield name, _array(content)
 
 
 def is_list_of_records(content: Any) -> bool:
@@ -32,6 +112,41 @@ def is_list_of_records(content: Any) -> bool:
         and bool(content)
         and all(isinstance(row, Mapping) for row in content)
     )
+
+
+def _are_signals(records: Sequence[Mapping]) -> bool:
+    """Return whether each record holds a whole signal, not the values of one instant."""
+    return all(_longest(record) > len(records) for record in (records[0], records[-1]))
+
+
+def _longest(content: Any) -> int:
+    """Return the greatest length of an array of numbers in nested content."""
+    if isinstance(content, Mapping):
+        return max(map(_longest, content.values()), default=0)
+    if isinstance(content, np.ndarray):
+        return max(content.shape, default=1) if content.dtype.kind in "biuf" else 0
+    return len(content) if isinstance(content, list) and not is_list_of_records(content) else 0
+
+
+def _signals(records: Sequence[Mapping]) -> dict[str, Any]:
+    """Return the signals of records by their names, or by their places where names are no help."""
+    for label in LABELS:
+        keys = [next((key for key in one if key.lower() == label), None) for one in records]
+        names = [one[key] if key else "" for key, one in zip(keys, records, strict=True)]
+        if all(isinstance(n, str) and n for n in names) and len(set(names)) == len(names):
+            rest = [
+                {other: value for other, value in one.items() if other != key}
+                for key, one in zip(keys, records, strict=True)
+            ]
+            return {n: _only_array(one) for n, one in zip(names, rest, strict=True)}
+    return {str(k): _only_array(record) for k, record in enumerate(records)}
+
+
+def _only_array(record: Mapping) -> Any:
+    """Return the array of a record that has one and no tables; else the record."""
+    arrays = [value for value in record.values() if _longest(value) > 1]
+    nested = any(isinstance(value, Mapping) for value in record.values())
+    return arrays[0] if len(arrays) == 1 and not nested else record
 
 
 def _transposed(records: Sequence[Mapping]) -> dict[str, list]:
@@ -57,20 +172,3 @@ def _array(content: Any) -> np.ndarray:
         return array.astype(float) if array.dtype == object else array
     except (ValueError, TypeError):  # text among numbers, or rows of different lengths
         return np.atleast_1d(np.asarray([str(value) for value in content], dtype=object))
-
-
-def _numbered(array: np.ndarray, name: str) -> Iterator[tuple[str, np.ndarray]]:
-    """Yield the columns of an array that may have several; a row vector is a column."""
-    if array.dtype.names:
-        for field in array.dtype.names:
-            yield from _numbered(array[field], f"{name}.{field}" if name else field)
-        return
-    if array.dtype.kind not in "biufOUS":
-        return
-    # A vector in any orientation: MATLAB's are matrices with one row or one column.
-    if max(array.shape) == array.size:
-        yield name, array.reshape(-1)
-        return
-    flat = array.reshape(len(array), prod(array.shape[1:]))
-    for k in range(flat.shape[1]):
-        yield f"{name}[{k}]", flat[:, k]

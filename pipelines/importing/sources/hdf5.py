@@ -8,7 +8,7 @@ import numpy as np
 
 from pipelines.errors import InputError
 from pipelines.importing.sources.extra import library
-from pipelines.importing.sources.flatten import flattened
+from pipelines.importing.sources.flatten import columns_of, turned, vector_lengths
 from pipelines.importing.sources.source import Columns, Source
 from pipelines.settings.import_map import SourceSettings
 
@@ -29,11 +29,12 @@ def open_hdf5(path: Path, settings: SourceSettings, format: str = "HDF5") -> Sou
     try:
         with h5py.File(path) as file:
             group = _group(file, settings.table)
-            sets = _data_sets(group)
+            empty = {data: _values(group[data], sample=True) for data in _data_sets(group)}
+            lengths = vector_lengths(array.shape for array in empty.values())
             columns = {
                 name: data
-                for data in sets
-                for name in flattened(_values(group[data], sample=True), data)
+                for data, array in empty.items()
+                for name in columns_of(array, data, lengths)
             }
     except OSError as error:
         raise InputError(f"is a damaged or truncated HDF5 file ({error}); copy it again") from error
@@ -45,11 +46,12 @@ def open_hdf5(path: Path, settings: SourceSettings, format: str = "HDF5") -> Sou
             values_of = {
                 name: values
                 for data in wanted
-                for name, values in flattened(_values(group[data]), data).items()
+                for name, values in columns_of(_values(group[data]), data, lengths).items()
             }
         return {name: values_of[name] for name in names}
 
-    return Source(path, format, tuple(columns), load)
+    notes = turned({data: array.shape for data, array in empty.items()}, lengths)
+    return Source(path, format, tuple(columns), load, tuple(notes))
 
 
 def _group(file: Any, table: str | None) -> Any:
@@ -93,4 +95,5 @@ def _values(data: Any, sample: bool = False) -> np.ndarray:
     if "MATLAB_class" in data.attrs and data.ndim > 1:
         return data[()].T if not sample else np.empty(data.shape[::-1], dtype=data.dtype)
     # Names follow from shape and type, so a sample needs no values; an empty array costs nothing.
-    return np.empty(data.shape, dtype=data.dtype) if sample else data[()]
+    values = np.empty(data.shape, dtype=data.dtype) if sample else data[()]
+    return np.atleast_1d(values)

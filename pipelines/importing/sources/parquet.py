@@ -9,7 +9,7 @@ import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
 from pipelines.errors import InputError
-from pipelines.importing.sources.flatten import flattened
+from pipelines.importing.sources.flatten import leaves_of, nested_source
 from pipelines.importing.sources.source import Columns, Source
 from pipelines.settings.base import repeated
 from pipelines.settings.import_map import SourceSettings
@@ -32,8 +32,8 @@ def open_parquet(path: Path, settings: SourceSettings) -> Source:
     # Columns of a list are numbered by its length, which only the values show.
     if any(pa.types.is_nested(field.type) for field in empty.schema):
         with _damage_reported():
-            columns = flattened(_opened(path).read().to_pydict())
-        return Source.in_memory(path, "Parquet", columns)
+            leaves = leaves_of(_opened(path).read().to_pydict())
+        return nested_source(path, "Parquet", leaves)
 
     def load(names: Sequence[str]) -> Columns:
         file = _opened(path)

@@ -1,4 +1,4 @@
-"""Logs of ROS 2: sensor_msgs/JointState from bags (.mcap, .db3, or their folder)."""
+"""Logs of ROS: sensor_msgs/JointState from bags (.bag of ROS 1; .mcap, .db3 or their folder)."""
 
 from collections.abc import Iterator
 from pathlib import Path
@@ -40,10 +40,10 @@ def open_rosbag(path: Path, settings: SourceSettings) -> Source:
         raise
     except Exception as error:  # the library raises errors of any class for a damaged bag
         raise InputError(
-            f"is no ROS 2 bag that can be read ({error}); record or copy it again"
+            f"is no ROS bag that can be read ({error}); record or copy it again"
         ) from error
     notes = (f"topic {topic}",)
-    return Source.in_memory(path, "ROS 2 bag", columns, notes)
+    return Source.in_memory(path, "ROS bag", columns, notes=notes)
 
 
 def _topic(reader: Any, named: str | None) -> str:

@@ -1,8 +1,9 @@
 """A log as named columns, whatever its format."""
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 from numpy.typing import NDArray
 
@@ -21,14 +22,18 @@ class Source:
     """Return the named columns, each (n,) as the file has them; a constant has one row."""
     notes: tuple[str, ...] = ()
     """How it was read, as far as that was derived from its content."""
+    units: Mapping[str, str] = field(default_factory=dict)
+    """Units that the file gives to columns outside of their names."""
+    clocks: Mapping[str, str] = field(default_factory=dict)
+    """Clocks of columns that were sampled by one of their own."""
+    remarks: tuple[str, ...] = ()
+    """What was not as it should be, for the user."""
 
     @classmethod
-    def in_memory(
-        cls, path: Path, format: str, columns: Columns, notes: tuple[str, ...] = ()
-    ) -> "Source":
+    def in_memory(cls, path: Path, format: str, columns: Columns, **more: Any) -> "Source":
         """Return a log whose columns, each (n,), have been read already."""
         return cls(
-            path, format, tuple(columns), lambda names: {n: columns[n] for n in names}, notes
+            path, format, tuple(columns), lambda names: {n: columns[n] for n in names}, **more
         )
 
     def __str__(self) -> str:

@@ -1,0 +1,141 @@
+"""The names of a text table's columns, from the lines above its rows."""
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+from pipelines.settings.units import unit_named
+
+UNIT = r"[\[(].*[\])]|[-\w°µ/·*%.²]{1,5}"
+"""Pattern of a possible unknown unit: in brackets, or short."""
+Line = Sequence[str]
+
+
+@dataclass(frozen=True)
+class Header:
+    """Names of columns, as far as lines above the rows have them."""
+
+    names: tuple[str, ...]
+    units: dict[str, str] = field(default_factory=dict)
+    """Units that a line of their own gives to columns."""
+    remark: str = ""
+    """How the names follow from lines that do not fit the rows."""
+
+
+def header(above: Sequence[Line], width: int, counts_rows: bool) -> Header:
+    """Return the names above rows of a width, or numbers where no line fits.
+
+    Parameters
+    ----------
+    above : sequence of sequences of str
+        Fields of the lines above the rows, without marks of comments.
+    width : int
+        Fields of a row.
+    counts_rows : bool
+        Whether the first column counts rows by one.
+    """
+    lines = [line for line in above if len(_stripped(line)) > 1]
+    by_key = _by_key([line for line in lines if _fits(line, width)])
+    if by_key is not None:
+        return by_key
+    # Numbers above the names are facts about the columns, such as gains.
+    words = [line for line in lines if not any(map(_is_number, line))]
+    last = _stripped(words[-1]) if words else []
+    if len(last) > width:  # a column more at the end, which is empty in most rows
+        return Header(_filled(last))
+    fitting = [k for k, line in enumerate(words) if _fits(line, width)]
+    if fitting:
+        return Header(_names([_padded(line, width) for line in words[: fitting[-1] + 1]]))
+    if len(last) == width - 1 and counts_rows:  # as R writes row names
+        return Header(("row", *_filled(last)), remark="row numbers have no name; called row")
+    numbered = tuple(f"c{k + 1}" for k in range(width))
+    if not last:
+        return Header(numbered)
+    return Header(
+        numbered,
+        remark=f"the header {', '.join(last)[:60]!r} has {len(last)} names, the rows {width}"
+        " fields: name them in source.columns",
+    )
+
+
+def _names(lines: Sequence[Line]) -> tuple[str, ...]:
+    """Return the names in the last of lines of equal width, with those above that it belongs to."""
+    last, over = lines[-1], _over(lines[:-1])
+    if over and _are_units(last):
+        return tuple(
+            f"{name} [{unit.strip('[]()')}]" if unit else name
+            for name, unit in zip(_names(lines[:-1]), last, strict=True)
+        )
+    # Names that occur again and again are parts of those above, as X and Y of a position.
+    named = [name for name in last if name]
+    if over and len(set(named)) < len(named):
+        return tuple(_part(name, part) for name, part in zip(over, last, strict=True))
+    return _filled(last)
+
+
+def _over(lines: Sequence[Line]) -> list[str]:
+    """Return the names of the line above, each carried on over blank fields; empty without one."""
+    names: list[str] = []
+    for name in lines[-1] if lines else ():
+        names.append(name or (names[-1] if names else ""))
+    return names if len(set(names)) > 1 else []
+
+
+def _part(name: str, part: str) -> str:
+    if len(part) == 1:
+        return f"{name} [{part}]"
+    return f"{name} {part}".strip()
+
+
+def _are_units(fields: Line) -> bool:
+    """Return whether fields are units: all short or in brackets, and half of them known."""
+    units = [field for field in fields if field]
+    known = sum(unit_named(unit.strip("[]()")) is not None for unit in units)
+    return 2 * known >= len(units) and all(
+        unit_named(unit) or re.fullmatch(UNIT, unit) for unit in units
+    )
+
+
+def _by_key(lines: Sequence[Line]) -> Header | None:
+    """Return the names of TwinCAT Scope: a line for each fact, whose key stands at every clock."""
+    facts = {line[0]: line for line in lines}
+    names = facts.get("Name")
+    if names is None or not any(key.startswith("SampleTime") for key in facts):
+        return None
+    units = facts.get("Unit", ())
+    called: list[str] = []
+    known: dict[str, str] = {}
+    for k, name in enumerate(names):
+        if name != "Name":
+            called.append(name or f"c{k + 1}")
+            if k < len(units) and unit_named(units[k]):
+                known[called[-1]] = units[k]
+            continue
+        first = names[k + 1] if k + 1 < len(names) else ""
+        called.append(f"time of {first} [ms]" if names.count("Name") > 1 else "time [ms]")
+    return Header(tuple(called), known)
+
+
+def _fits(line: Line, width: int) -> bool:
+    return len(_stripped(line)) == width or len(_stripped(line)) <= width == len(line)
+
+
+def _stripped(line: Line) -> list[str]:
+    """Return fields without empty ones at the end."""
+    fields = list(line)
+    while fields and not fields[-1]:
+        fields.pop()
+    return fields
+
+
+def _padded(line: Line, width: int) -> list[str]:
+    return [*line, *[""] * width][:width]
+
+
+def _filled(names: Line) -> tuple[str, ...]:
+    """Return names, numbered where one is missing."""
+    return tuple(name or f"c{k}" for k, name in enumerate(names, 1))
+
+
+def _is_number(text: str) -> bool:
+    return re.fullmatch(r"[-+]?[\d.,]*\d[\d.,]*([eE][-+]?\d+)?", text) is not None
