@@ -1,7 +1,7 @@
 """A log with the columns that a map names: the runs of its clock, and its quantities."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -31,6 +31,8 @@ class Channel:
     required: bool
     enabled: str | None = None
     """Column that is 0 where the reading is not valid."""
+    time: str | None = None
+    """Column of its clock, if that is not the clock of the log."""
 
 
 @dataclass(frozen=True)
@@ -112,8 +114,8 @@ class Log:
 
     def _quantity(self, channel: Channel, run: Run, findings: list[Finding]) -> NDArray:
         names = columns_of(channel.reading, channel.where)
-        if channel.reading.time is not None:
-            return self._interpolated(channel, run, findings)
+        if channel.time is not None:
+            return self._interpolated(channel, channel.time, run, findings)
         picked = {}
         for name in names:
             values = self.columns[name]
@@ -132,14 +134,15 @@ class Log:
         note = noting(channel.target, findings)
         return quantity(channel.reading, channel.gain, picked, channel.target, note)
 
-    def _interpolated(self, channel: Channel, run: Run, findings: list[Finding]) -> NDArray:
+    def _interpolated(
+        self, channel: Channel, column: str, run: Run, findings: list[Finding]
+    ) -> NDArray:
         """Return a channel with a clock of its own, interpolated linearly at a run's instants."""
         reading, of_time = channel.reading, noting("time", findings)
-        column = str(reading.time)
         stamps = clock.stamps(self.columns[column], column, self.settings, of_time)
         columns = {name: self.columns[name] for name in columns_of(reading, channel.where)}
         if {len(values) for values in columns.values()} - {1, len(stamps)}:
-            raise InputError(f"{channel.where} and its clock {reading.time!r} differ in length")
+            raise InputError(f"{channel.where} and its clock {column!r} differ in length")
         note = noting(channel.target, findings)
         values = quantity(reading, channel.gain, columns, channel.target, note)
         known = np.isfinite(values)
@@ -148,9 +151,7 @@ class Log:
         own = clock.runs(since, stamps[known], of_time)
         # Runs of two clocks cannot be matched, as neither shows which of the other it belongs to.
         if len(own) != 1:
-            raise InputError(
-                f"{channel.where}.time: {reading.time!r} has {len(own)} runs, expected one"
-            )
+            raise InputError(f"{channel.where}.time: {column!r} has {len(own)} runs, expected one")
         time, samples = own[0].time_s + own[0].began_s, values[known][own[0].rows]
         at = run.began_s + run.time_s
         interpolated = np.interp(at, time, samples, left=np.nan, right=np.nan)
@@ -161,7 +162,7 @@ class Log:
         on_sample = time[before] == at
         interpolated[np.append(gap, False)[before] & ~on_sample] = np.nan
         rate_hz = 1.0 / np.median(steps)
-        seen = f"sampled at {rate_hz:.4g} Hz by a clock of its own ({reading.time})"
+        seen = f"sampled at {rate_hz:.4g} Hz by a clock of its own ({column})"
         note(seen, "interpolated linearly, not across its gaps")
         return interpolated
 
@@ -174,7 +175,7 @@ def read_log(source: Source, settings: ImportMap, map_path: Path) -> Log:
     SettingsError
         If the map names columns that the log does not have, or has twice.
     """
-    channels = tuple(_channels(settings))
+    channels = tuple(_channels(settings, source))
     needed = _needed(channels, settings.time)
     for name, where in needed.items():
         # Asked first: a name that occurs twice is absent, because both columns have numbers.
@@ -199,9 +200,12 @@ def read_log(source: Source, settings: ImportMap, map_path: Path) -> Log:
         run = Run(np.arange(rows), np.arange(rows) / rate_hz, 0.0)
         columns = _as_numbers(columns, set(), findings)
         return Log(source, settings.time, channels, columns, 0.0, rows, (run,), findings)
-    clocks = {channel.reading.time for channel in channels} | {settings.time.column}
-    columns = _as_numbers(columns, clocks, findings)
     column = settings.time.column
+    clocks = {channel.time for channel in channels} | {column}
+    # A clock that is the same as that of the log is none of the channel's own.
+    same = {name for name in clocks - {None} if np.array_equal(columns[name], columns[column])}
+    channels = tuple(replace(one, time=None) if one.time in same else one for one in channels)
+    columns = _as_numbers(columns, clocks, findings)
     stamps = clock.stamps(columns[column], column, settings.time, note)
     origin = clock.first_stamp(stamps)
     time_s = clock.seconds(stamps, origin, settings.time, note)
@@ -209,7 +213,7 @@ def read_log(source: Source, settings: ImportMap, map_path: Path) -> Log:
     return Log(source, settings.time, channels, columns, origin, len(stamps), runs, findings)
 
 
-def _channels(settings: ImportMap) -> Iterator[Channel]:
+def _channels(settings: ImportMap, source: Source) -> Iterator[Channel]:
     for i, joint in enumerate(settings.joint):
         for name, reading in joint.readings():
             gain = reading.gain(transmission.dimension_at(joint.kind, name))
@@ -222,9 +226,23 @@ def _channels(settings: ImportMap) -> Iterator[Channel]:
                 required=name in ("angle", "torque"),
                 # While a drive is off only its torque is no measurement; the encoder still is one.
                 enabled=joint.enabled if name == "torque" else None,
+                time=_clock(reading, f"joint[{i}].{name}", settings, source),
             )
     for i, force in enumerate(settings.force):
-        yield Channel(force.target, f"force[{i}]", force, 1.0, required=False)
+        where = f"force[{i}]"
+        clock_of = _clock(force, where, settings, source)
+        yield Channel(force.target, where, force, 1.0, required=False, time=clock_of)
+
+
+def _clock(reading: ReadingSettings, where: str, settings: ImportMap, source: Source) -> str | None:
+    """Return the clock of a reading: of the map, or else of the file, if it is not the log's."""
+    if reading.time is not None or settings.time.column is None:
+        return reading.time
+    own = {source.clocks.get(name) for name in columns_of(reading, where)} - {None}
+    if len(own) > 1:
+        names = ", ".join(sorted(map(str, own)))
+        raise SettingsError(f"{where}.expression: mixes columns of the clocks {names}; use one")
+    return next(iter(own - {settings.time.column}), None)
 
 
 def _needed(channels: tuple[Channel, ...], time: TimeSettings) -> dict[str, str]:
@@ -233,8 +251,8 @@ def _needed(channels: tuple[Channel, ...], time: TimeSettings) -> dict[str, str]
     for channel in channels:
         for name in columns_of(channel.reading, channel.where):
             needed.setdefault(name, channel.where)
-        if channel.reading.time is not None:
-            needed.setdefault(channel.reading.time, f"{channel.where}.time")
+        if channel.time is not None:
+            needed.setdefault(channel.time, f"{channel.where}.time")
         if channel.enabled is not None:
             needed.setdefault(channel.enabled, f"{channel.where.rpartition('.')[0]}.enabled")
     return needed

@@ -4,12 +4,13 @@ import codecs
 import csv
 import re
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
 from pipelines.errors import InputError
 from pipelines.importing.sources.header import Header, header
+from pipelines.importing.sources.source import numbered_twins
 from pipelines.settings.base import repeated
 from pipelines.settings.import_map import SourceSettings
 
@@ -38,7 +39,8 @@ class Dialect:
     """Columns of numbers."""
     heads: tuple[frozenset[str], ...]
     """Words above each column, by which a header that comes again is recognised."""
-    units: dict[str, str]
+    units: Mapping[str, str]
+    clocks: Mapping[str, str]
     notes: tuple[str, ...]
     remark: str
     """How the names follow from a header that does not fit; empty where it does."""
@@ -107,7 +109,7 @@ def find_dialect(start: bytes, whole: bool, settings: SourceSettings) -> Dialect
         notes.append(
             f"columns with the same name are {', '.join(f'{name}#1, {name}#2' for name in twice)}"
         )
-    apart = _numbered_twins(names)
+    apart = numbered_twins(names)
     remark = "" if settings.columns else named.remark
     return Dialect(
         encoding,
@@ -119,6 +121,7 @@ def find_dialect(start: bytes, whole: bool, settings: SourceSettings) -> Dialect
         frozenset(apart[k] for k in table.numeric),
         table.heads(below),
         named.units,
+        {apart[k]: apart[clock] for k, clock in named.clocks.items()},
         (*notes, remark) if remark else tuple(notes),
         remark,
     )
@@ -317,13 +320,3 @@ def _is_number(field: str, decimal: str) -> bool:
 
 def _looks_like_number(field: str) -> bool:
     return re.fullmatch(r"[-+]?[\d.,]*\d[\d.,]*([eE][-+]?\d+)?", field) is not None
-
-
-def _numbered_twins(names: Sequence[str]) -> tuple[str, ...]:
-    """Add numbers to names that occur twice: two columns ``q`` become ``q#1`` and ``q#2``."""
-    times, seen = Counter(names), Counter[str]()
-    apart = []
-    for name in names:
-        seen[name] += 1
-        apart.append(name if times[name] == 1 else f"{name}#{seen[name]}")
-    return tuple(apart)

@@ -6,8 +6,8 @@ from types import ModuleType
 from pipelines.errors import InputError
 
 
-def library(name: str) -> ModuleType:
-    """Return a library of the extra ``import``.
+def library(name: str, extra: str = "import") -> ModuleType:
+    """Return a library of an extra.
 
     Raises
     ------
@@ -19,5 +19,5 @@ def library(name: str) -> ModuleType:
     except ImportError as error:
         package = name.partition(".")[0]
         raise InputError(
-            f"needs {package}, which is not installed; pip install 'exoid[import]'"
+            f"needs {package}, which is not installed; pip install 'exoid[{extra}]'"
         ) from error

@@ -29,7 +29,23 @@ def nested_source(
         for column, values in columns_of(array, name, lengths).items()
     }
     notes = (*notes, *turned({name: a.shape for name, a in leaves.items()}, lengths))
-    return Source.in_memory(path, format, columns, notes=notes, **more)
+    return Source.in_memory(path, format, columns, notes=notes, clocks=clocks_of(columns), **more)
+
+
+def clocks_of(columns: Mapping[str, np.ndarray], separator: str = ".") -> dict[str, str]:
+    """Return the clock in the same table as each column, where several tables have one."""
+    words = ("time", "t", "timestamp", "timestamps")
+    clocks = {
+        name.rpartition(separator)[0]: name
+        for name, values in columns.items()
+        if name.rpartition(separator)[2].casefold() in words and len(values) > 1
+    }
+    owners = {name: clocks.get(name.rpartition(separator)[0], name) for name in columns}
+    return {
+        name: clock
+        for name, clock in owners.items()
+        if len(clocks) > 1 and clock != name and len(columns[clock]) == len(columns[name])
+    }
 
 
 def leaves_of(content: Any, name: str = "") -> Leaves:

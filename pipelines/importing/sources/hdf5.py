@@ -8,7 +8,7 @@ import numpy as np
 
 from pipelines.errors import InputError
 from pipelines.importing.sources.extra import library
-from pipelines.importing.sources.flatten import columns_of, turned, vector_lengths
+from pipelines.importing.sources.flatten import clocks_of, columns_of, turned, vector_lengths
 from pipelines.importing.sources.source import Columns, Source
 from pipelines.settings.import_map import SourceSettings
 
@@ -31,11 +31,9 @@ def open_hdf5(path: Path, settings: SourceSettings, format: str = "HDF5") -> Sou
             group = _group(file, settings.table)
             empty = {data: _values(group[data], sample=True) for data in _data_sets(group)}
             lengths = vector_lengths(array.shape for array in empty.values())
-            columns = {
-                name: data
-                for data, array in empty.items()
-                for name in columns_of(array, data, lengths)
-            }
+            parts = {data: columns_of(array, data, lengths) for data, array in empty.items()}
+            columns = {name: data for data, part in parts.items() for name in part}
+            clocks = clocks_of({k: v for part in parts.values() for k, v in part.items()}, "/")
     except OSError as error:
         raise InputError(f"is a damaged or truncated HDF5 file ({error}); copy it again") from error
 
@@ -51,7 +49,7 @@ def open_hdf5(path: Path, settings: SourceSettings, format: str = "HDF5") -> Sou
         return {name: values_of[name] for name in names}
 
     notes = turned({data: array.shape for data, array in empty.items()}, lengths)
-    return Source(path, format, tuple(columns), load, tuple(notes))
+    return Source(path, format, tuple(columns), load, tuple(notes), clocks=clocks)
 
 
 def _group(file: Any, table: str | None) -> Any:

@@ -18,6 +18,8 @@ class Header:
     names: tuple[str, ...]
     units: dict[str, str] = field(default_factory=dict)
     """Units that a line of their own gives to columns."""
+    clocks: dict[int, int] = field(default_factory=dict)
+    """Place of the clock of each column, where the names show several clocks."""
     remark: str = ""
     """How the names follow from lines that do not fit the rows."""
 
@@ -41,11 +43,14 @@ def header(above: Sequence[Line], width: int, counts_rows: bool) -> Header:
     # Numbers above the names are facts about the columns, such as gains.
     words = [line for line in lines if not any(map(_is_number, line))]
     last = _stripped(words[-1]) if words else []
-    if len(last) > width:  # a column more at the end, which is empty in most rows
-        return Header(_filled(last))
+    names: tuple[str, ...] = ()
     fitting = [k for k, line in enumerate(words) if _fits(line, width)]
-    if fitting:
-        return Header(_names([_padded(line, width) for line in words[: fitting[-1] + 1]]))
+    if len(last) > width:  # a column more at the end, which is empty in most rows
+        names = _filled(last)
+    elif fitting:
+        names = _names([_padded(line, width) for line in words[: fitting[-1] + 1]])
+    if names:
+        return Header(names, clocks=_clocks([_is_x(name) for name in names]))
     if len(last) == width - 1 and counts_rows:  # as R writes row names
         return Header(("row", *_filled(last)), remark="row numbers have no name; called row")
     numbered = tuple(f"c{k + 1}" for k in range(width))
@@ -71,6 +76,22 @@ def _names(lines: Sequence[Line]) -> tuple[str, ...]:
     if over and len(set(named)) < len(named):
         return tuple(_part(name, part) for name, part in zip(over, last, strict=True))
     return _filled(last)
+
+
+def _is_x(name: str) -> bool:
+    """Return whether a name is that of an oscilloscope's or of LabVIEW's clock."""
+    return name.casefold().endswith("[x]") or name == "X_Value"
+
+
+def _clocks(is_clock: Sequence[bool]) -> dict[int, int]:
+    """Return the clock before each other column, if there are several clocks."""
+    clocks: dict[int, int] = {}
+    last = None
+    for k, clock in enumerate(is_clock):
+        last = k if clock else last
+        if last is not None and not clock:
+            clocks[k] = last
+    return clocks if sum(is_clock) > 1 else {}
 
 
 def _over(lines: Sequence[Line]) -> list[str]:
@@ -113,7 +134,7 @@ def _by_key(lines: Sequence[Line]) -> Header | None:
             continue
         first = names[k + 1] if k + 1 < len(names) else ""
         called.append(f"time of {first} [ms]" if names.count("Name") > 1 else "time [ms]")
-    return Header(tuple(called), known)
+    return Header(tuple(called), known, _clocks([name == "Name" for name in names]))
 
 
 def _fits(line: Line, width: int) -> bool:

@@ -2,14 +2,19 @@
 
 from collections.abc import Callable
 from pathlib import Path
+from zipfile import ZipFile, is_zipfile
 
 from pipelines.errors import InputError
+from pipelines.importing.sources.excel import open_excel
 from pipelines.importing.sources.hdf5 import open_hdf5
 from pipelines.importing.sources.json_text import open_json
 from pipelines.importing.sources.matlab import open_matlab
+from pipelines.importing.sources.mdf import open_mdf
+from pipelines.importing.sources.numpy_archive import open_numpy
 from pipelines.importing.sources.parquet import open_parquet
 from pipelines.importing.sources.rosbag import open_rosbag
 from pipelines.importing.sources.source import Source
+from pipelines.importing.sources.tdms import open_tdms
 from pipelines.importing.sources.text import open_text
 from pipelines.settings.import_map import SourceSettings
 from pipelines.validation.suggestion import similar_file
@@ -20,6 +25,11 @@ BEGINNINGS: dict[bytes, Callable[[Path, SourceSettings], Source]] = {
     b"MATLAB": open_matlab,
     b"\x89MCAP0": open_rosbag,
     b"SQLite format 3\0": open_rosbag,
+    b"#ROSBAG V": open_rosbag,
+    b"TDSm": open_tdms,
+    b"MDF     ": open_mdf,
+    b"UnFinMF ": open_mdf,
+    b"\x93NUMPY": open_numpy,
 }
 """First bytes of a file, by format."""
 
@@ -63,6 +73,13 @@ def _reader(path: Path) -> Callable[[Path, SourceSettings], Source]:
     for beginning, reader in BEGINNINGS.items():
         if start.startswith(beginning):
             return reader
+    if is_zipfile(path):
+        parts = ZipFile(path).namelist()
+        if "xl/workbook.xml" in parts:
+            return open_excel
+        if any(part.endswith(".npy") for part in parts):
+            return open_numpy
+        raise InputError("is a zip archive, expected a log; unpack it and name a file in it")
     if path.suffix == ".mat":  # v4 has no signature
         return open_matlab
     is_json = start.removeprefix(b"\xef\xbb\xbf").lstrip()[:1] in (b"{", b"[")

@@ -1,5 +1,6 @@
 """A log as named columns, whatever its format."""
 
+from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -25,7 +26,7 @@ class Source:
     units: Mapping[str, str] = field(default_factory=dict)
     """Units that the file gives to columns outside of their names."""
     clocks: Mapping[str, str] = field(default_factory=dict)
-    """Clocks of columns that were sampled by one of their own."""
+    """Clocks of columns, where the file says which was sampled by which."""
     remarks: tuple[str, ...] = ()
     """What was not as it should be, for the user."""
 
@@ -38,3 +39,13 @@ class Source:
 
     def __str__(self) -> str:
         return str(self.path)
+
+
+def numbered_twins(names: Sequence[str]) -> tuple[str, ...]:
+    """Add numbers to names that occur twice: two columns ``q`` become ``q#1`` and ``q#2``."""
+    times, seen = Counter(names), Counter[str]()
+    apart = []
+    for name in names:
+        seen[name] += 1
+        apart.append(name if times[name] == 1 else f"{name}#{seen[name]}")
+    return tuple(apart)

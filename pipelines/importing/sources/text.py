@@ -57,6 +57,7 @@ def _source(path: Path, format: str, dialect: Dialect, content: Callable[[], Any
         lambda names: _load(content(), dialect, names),
         dialect.notes,
         units=dialect.units,
+        clocks=dialect.clocks,
         remarks=(dialect.remark,) if dialect.remark else (),
     )
 
@@ -124,7 +125,7 @@ def _refuse_second_table(part: pd.DataFrame, dialect: Dialect) -> None:
         )
         if len(set(given)) == len(given) and not again:
             raise InputError(
-                f"holds a second table from row {part.index[row]} on, under"
+                f"holds a second table from row {part.index.to_numpy()[row]} on, under"
                 f" {', '.join(given)[:60]!r}; save each as a file of its own"
             )
 

@@ -1,0 +1,71 @@
+"""Logs in workbooks of Excel (.xlsx)."""
+
+import csv
+from collections.abc import Iterable
+from datetime import date, time
+from io import StringIO
+from pathlib import Path
+from typing import Any
+
+from pipelines.errors import InputError
+from pipelines.importing.sources.extra import library
+from pipelines.importing.sources.source import Source
+from pipelines.importing.sources.text import open_lines
+from pipelines.settings.import_map import SourceSettings
+from pipelines.validation.suggestion import suggestion
+
+
+def open_excel(path: Path, settings: SourceSettings) -> Source:
+    """Return the log in a workbook; ``source.table`` names its sheet if several have a table.
+
+    Raises
+    ------
+    InputError
+        If it is damaged, or no sheet or several have a table of numbers.
+    """
+    openpyxl = library("openpyxl")
+    try:
+        book = openpyxl.load_workbook(path, read_only=True, data_only=True)
+        sheets = {sheet.title: sheet for sheet in book.worksheets}
+        if settings.table is not None and settings.table not in sheets:
+            raise InputError(
+                f"has no sheet {settings.table!r}, which source.table names; "
+                f"{suggestion(settings.table, list(sheets))}"
+            )
+        texts = {
+            title: _text(sheet.iter_rows(values_only=True))
+            for title, sheet in sheets.items()
+            if settings.table in (None, title)
+        }
+        book.close()
+    except InputError:
+        raise
+    except Exception as error:  # the library raises errors of any class for a damaged file
+        raise InputError(f"is a damaged workbook ({error}); save it again") from error
+    as_text = settings.model_copy(update={"delimiter": "\t", "encoding": "utf-8"})
+    found: dict[str, Source] = {}
+    problem = InputError("has no sheet of cells; save the table again")
+    for title, text in texts.items():
+        try:
+            found[title] = open_lines(path, "Excel", text, as_text)
+        except InputError as error:
+            problem = error
+    if len(found) > 1:
+        raise InputError(f"has tables in {', '.join(found)}; name one in the map: source.table")
+    if not found:
+        raise problem
+    return next(iter(found.values()))
+
+
+def _text(rows: Iterable[tuple[Any, ...]]) -> str:
+    """Return rows of cells as text with tabs between the fields."""
+    lines = StringIO()
+    csv.writer(lines, delimiter="\t", lineterminator="\n").writerows(map(_cells, rows))
+    return lines.getvalue()
+
+
+def _cells(row: tuple[Any, ...]) -> list[str]:
+    return [
+        cell.isoformat() if isinstance(cell, date | time) else " ".join(str(cell).split())
+        for cell in ("" if cell is None else cell for cell in row)
+    ]
