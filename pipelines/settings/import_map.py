@@ -35,8 +35,14 @@ class SourceSettings(Settings):
     skip_rows: int | None = Field(None, ge=0, description="Lines of a text file before its header.")
     columns: tuple[str, ...] | None = Field(None, description="Columns of a text without a header.")
     encoding: str | None = Field(None, description="Encoding of a text file, such as latin-1.")
+    join: tuple[str, ...] | None = Field(
+        None,
+        min_length=2,
+        description='Files of one run, joined by their clocks; "*" stands for its name: "*_q.csv".',
+    )
     table: str | None = Field(
-        None, description="Place of the columns: JSON key, HDF5 group, .mat struct, ROS topic."
+        None,
+        description="Place of the columns: JSON key, HDF5 group, .mat struct, sheet, ROS topic.",
     )
 
     @field_validator("delimiter")
@@ -89,6 +95,9 @@ class ReadingSettings(Settings):
     signed_bits: Literal[8, 16, 24, 32] | None = Field(
         None, description="Bits of a signed register that was logged without its sign."
     )
+    sign_bit: int | None = Field(
+        None, ge=3, le=62, description="Bit that is set below zero, where the rest is a magnitude."
+    )
     wraps_at: Factor | None = Field(
         None, description="Raw reading at which a counter wraps around to 0, such as 65536 or 360."
     )
@@ -108,6 +117,8 @@ class ReadingSettings(Settings):
             )
         if self.range is not None and self.range[0] >= self.range[1]:
             raise ValueError(f"range: found {list(self.range)}, expected the lower limit first")
+        if self.sign_bit is not None and self.signed_bits is not None:
+            raise ValueError("expected either signed_bits or sign_bit, one of them")
         if self.begins_at is not None and self.wraps_at is None:
             raise ValueError("begins_at: needs wraps_at; set wraps_at, or remove it")
         return self

@@ -205,7 +205,7 @@ def test_an_encoders_steps_show_its_unit(guessed, pendulum, write_csv):
 def test_a_torque_that_does_not_follow_the_motion_is_doubtful(guessed, pendulum, write_csv):
     noise = np.random.default_rng(1).normal(size=len(pendulum.time))
     _, doubts = guessed(write_csv(swinging(pendulum) | {"torque": noise}))
-    assert "of the torque only" in doubts["joint[0].torque.sign"]
+    assert "of the torque, and" in doubts["joint[0].torque.sign"]
 
 
 def test_a_velocity_of_another_joint_is_doubtful(guessed, pendulum, write_csv):

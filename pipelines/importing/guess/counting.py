@@ -1,7 +1,7 @@
 """Counters in a log: registers that lost their sign, or that wrap around."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,17 +9,25 @@ from numpy.typing import NDArray
 from pipelines.importing.guess.joints import JointColumns
 from pipelines.importing.guess.motion import TURNS
 from pipelines.importing.quantities.numbers import are_whole
-from pipelines.importing.quantities.wraparound import full_at, signed, unwrapped
+from pipelines.importing.quantities.wraparound import (
+    full_at,
+    sign_bit,
+    signed,
+    unwrapped,
+    with_sign_bit,
+)
 
 
 @dataclass(frozen=True)
 class Counting:
-    """How a column was counted; both are None where it has plain numbers."""
+    """How a column was counted; all are None where it has plain numbers."""
 
     bits: int | None = None
     """Bits of a signed register that was logged as unsigned."""
     full: float | None = None
     """Reading at which it wraps around to 0."""
+    sign: int | None = None
+    """Bit of its sign, where the rest is a magnitude."""
 
     def undone(self, values: NDArray) -> NDArray:
         """Return readings with their sign and without wraparounds.
@@ -37,6 +45,8 @@ class Counting:
         values = values.astype(float)
         if self.bits is not None:
             values = signed(values, self.bits)
+        if self.sign is not None:
+            values = with_sign_bit(values, self.sign)
         return values if self.full is None else unwrapped(values, self.full)
 
 
@@ -56,19 +66,24 @@ def countings(joint: JointColumns, columns: Mapping[str, NDArray]) -> dict[str, 
         Counting by quantity.
     """
     logged = {quantity: columns[m.column].astype(float) for quantity, m in joint.columns.items()}
-    counted = {quantity: Counting(lost_sign(values)) for quantity, values in logged.items()}
+    counted = {quantity: _without_wraps(values) for quantity, values in logged.items()}
     unit = joint.columns["angle"].unit
     # Without a unit any of these may be a turn; an angle in counts wraps at a register.
     turns = [turn for name, turn in TURNS.items() if unit in (None, name)]
     full = full_at(counted["angle"].undone(logged["angle"]), turns)
     if full is None:
         return counted
-    counted["angle"] = Counting(counted["angle"].bits, full)
+    counted["angle"] = replace(counted["angle"], full=full)
     # A set-point may also step by a turn on purpose. It wraps around only where the angle does.
     reference = counted.get("reference")
     if reference is not None and full_at(reference.undone(logged["reference"]), turns) == full:
-        counted["reference"] = Counting(reference.bits, full)
+        counted["reference"] = replace(reference, full=full)
     return counted
+
+
+def _without_wraps(values: NDArray) -> Counting:
+    bits = lost_sign(values)
+    return Counting(bits, sign=None if bits else sign_bit(values))
 
 
 def lost_sign(values: NDArray) -> int | None:

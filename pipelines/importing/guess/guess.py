@@ -10,16 +10,24 @@ from numpy.typing import NDArray
 from pipelines.errors import InputError, about
 from pipelines.importing.guess.counting import countings
 from pipelines.importing.guess.joint_table import write_joint
-from pipelines.importing.guess.joints import JointColumns, group_joints, order_is_known
+from pipelines.importing.guess.joints import (
+    TURNING,
+    JointColumns,
+    group_joints,
+    moving,
+    order_is_known,
+)
 from pipelines.importing.guess.names import Meaning, meaning
 from pipelines.importing.guess.proposal import Proposal
 from pipelines.importing.guess.time import TimeGuess, guess_time, runs_of, write_time
 from pipelines.importing.quantities.numbers import numbers, whole_nanoseconds
+from pipelines.importing.quantities.wraparound import fill_value
 from pipelines.importing.sources.open import open_source
 from pipelines.importing.sources.source import Columns, Source
 from pipelines.importing.time import clock
 from pipelines.importing.time.period import repeats_after
 from pipelines.settings.import_map import SourceSettings
+from pipelines.settings.units import unit_named
 
 TRAIN = 0.7
 """Share of a run, or of the files, to fit to."""
@@ -38,18 +46,20 @@ def propose(paths: Sequence[Path]) -> Proposal:
     with about(paths[0]):
         source = open_source(paths[0], SourceSettings())
         columns, typed = _typed_columns(source)
-        names = [meaning(name) for name in source.names]
-        time = guess_time(names, columns, typed)
+        names = _meanings(source)
+        time = guess_time(_clock_first(names, source), columns, typed)
         if time is None:
             raise InputError(_no_clock(names, columns))
     for path in paths[1:]:
         _check_columns(path, source)
+    clocks = _onto_one_clock(source, time.column, columns)
     columns[time.column] = time.stamps(columns[time.column])
     # Within one run, because integrals and fits across a restart of the clock mean nothing.
     run = max(runs_of(columns[time.column], time.unit), key=len)
     rows = len(columns[time.column])
     # Columns of another length are constants, or have a clock of their own.
     of_run = {name: values[run.rows] for name, values in columns.items() if len(values) == rows}
+    limits = _without_fill_values(of_run, time.column)
     with about(paths[0]):
         joints = group_joints(
             [m for m in names if m.column in of_run], of_run, run.time_s, time.column
@@ -68,9 +78,14 @@ def propose(paths: Sequence[Path]) -> Proposal:
         proposal.remark(f"Read as {source.format}: {note}.")
     write_time(proposal, time)
     used = {time.column}
+    joints, resting = moving(joints, of_run)
     alone = len(joints) == 1
     for number, joint in enumerate(joints):
-        used |= set(write_joint(proposal, number, joint, of_run, run.time_s, alone))
+        used |= set(write_joint(proposal, number, joint, of_run, run.time_s, alone, clocks, limits))
+    used |= {clocks[name] for name in used if name in clocks}
+    if resting:
+        rests = f"{', '.join(resting)} rest while others move, and are left out"
+        proposal.doubt("joint", f"{rests}; with them, name their columns too")
     _write_geometry(proposal, joints)
     _write_recordings(proposal, paths, [_period(path, time, joints) for path in paths])
     _write_unused(proposal, [name for name in source.names if name not in used], columns)
@@ -87,6 +102,57 @@ def _typed_columns(source: Source) -> tuple[Columns, dict[str, str]]:
         if stamps is not None:
             columns[name], typed[name] = stamps, "iso8601"
     return columns, typed
+
+
+def _meanings(source: Source) -> list[Meaning]:
+    """Return the meanings of the columns' names, and of units and clocks that the file gives."""
+    clocks = set(source.clocks.values())
+    meanings = []
+    for name in source.names:
+        unit = source.units.get(name)
+        one = meaning(f"{name} [{unit}]" if unit and unit_named(unit) else name)
+        one = replace(one, column=name)
+        meanings.append(replace(one, quantity="time", joint="") if name in clocks else one)
+    return meanings
+
+
+def _clock_first(names: Sequence[Meaning], source: Source) -> list[Meaning]:
+    """Return the meanings, of several clocks only that of the first torque or current."""
+    of_drive = [m.column for m in names if m.quantity in TURNING and m.column in source.clocks]
+    of_others = [name for name in source.clocks if name not in of_drive]
+    if not source.clocks:
+        return list(names)
+    clock_name = source.clocks[(of_drive or of_others)[0]]
+    return [m for m in names if m.column == clock_name]
+
+
+def _onto_one_clock(source: Source, column: str, columns: Columns) -> dict[str, str]:
+    """Interpolate columns with a clock of their own, and return that clock by column."""
+    stamps = columns[column].astype(float)
+    own: dict[str, str] = {}
+    for name, clock_name in source.clocks.items():
+        at, values = columns[clock_name], columns[name]
+        numeric = {at.dtype.kind, values.dtype.kind} <= set("biuf")
+        if clock_name == column or not numeric or np.array_equal(at, columns[column]):
+            continue
+        known = np.isfinite(at) & np.isfinite(values)
+        if known.any() and np.all(np.diff(at[known]) > 0):
+            inside = np.interp(stamps, at[known], values[known], left=np.nan, right=np.nan)
+            columns[name], own[name] = inside, clock_name
+    return own
+
+
+def _without_fill_values(columns: Columns, clock_column: str) -> dict[str, list[float]]:
+    """Replace values for missing readings by NaN; return the limits of the others by column."""
+    limits: dict[str, list[float]] = {}
+    for name, values in columns.items():
+        if values.dtype.kind not in "iuf" or name == clock_column:
+            continue
+        while (value := fill_value(columns[name].astype(float))) is not None:
+            columns[name] = np.where(columns[name] == value, np.nan, columns[name].astype(float))
+            known = columns[name][np.isfinite(columns[name])]
+            limits[name] = [float(np.min(known)), float(np.max(known))]
+    return limits
 
 
 def _no_clock(names: Sequence[Meaning], columns: Mapping[str, NDArray]) -> str:

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from pipelines.contracts.checks import LARGEST_ANGLE_RAD
 from pipelines.contracts.joint_units import Kind
+from pipelines.importing.guess.continuity import crosses_zero, is_continuous
 from pipelines.importing.guess.counting import Counting, countings
 from pipelines.importing.guess.joints import JointColumns
 from pipelines.importing.guess.motion import FROM_NAME, TURNS, Units, guess_units
@@ -19,9 +20,6 @@ from pipelines.importing.sources.source import Columns
 from pipelines.settings.transmission import dimension_at
 from pipelines.settings.units import UNITS
 
-FOLLOWS = 0.7
-"""Least share of a torque's variance that the motion must explain before its sign is judged."""
-
 
 def write_joint(
     proposal: Proposal,
@@ -30,6 +28,8 @@ def write_joint(
     columns: Columns,
     time_s: NDArray,
     alone: bool,
+    clocks: Mapping[str, str],
+    limits: Mapping[str, list[float]],
 ) -> list[str]:
     """Write a joint's tables into a map.
 
@@ -47,6 +47,10 @@ def write_joint(
         Times, s.
     alone : bool
         Whether it is the only joint. Motions of other joints would disturb a fit of its torque.
+    clocks : mapping of str to str
+        Clocks of columns that have one of their own.
+    limits : mapping of str to list of float
+        Lowest and highest reading of columns with a value for missing ones.
 
     Returns
     -------
@@ -63,7 +67,9 @@ def write_joint(
     fit = None
     if alone and joint.drive and units.angle in TURNS:
         fit = fit_torque(time_s, logged["angle"] * UNITS[units.angle].factor, logged[joint.drive])
-    writer = _JointWriter(proposal, f"joint[{number}]", joint, counters, logged, units, kind)
+    writer = _JointWriter(
+        proposal, f"joint[{number}]", joint, counters, logged, units, kind, clocks, limits
+    )
     writer.write_head(columns)
     writer.write_angle(fit)
     if "velocity" in joint.columns:
@@ -102,6 +108,8 @@ class _JointWriter:
     logged: Mapping[str, NDArray]
     units: Units
     kind: Kind
+    clocks: Mapping[str, str]
+    limits: Mapping[str, list[float]]
 
     def __post_init__(self) -> None:
         self.used: list[str] = []
@@ -131,6 +139,9 @@ class _JointWriter:
         """Write the table of the angle; a fit of the torque shows its zero."""
         self._write_column("angle")
         why, sure = self.units.why, self.units.sure
+        if not is_continuous(self.logged["angle"]):
+            why += "; jumps from row to row, as no motion does: outliers, or an unknown encoding"
+            sure = False
         if self.too_far:
             why += f"; {self.turns:.4g} turns are too many for a joint: check unit and gear_ratio"
             sure = False
@@ -179,7 +190,10 @@ class _JointWriter:
                 continue
             self.used.append(meaning.column)
             self.proposal.table(f"[joint.{quantity}]", f"{self.where}.{quantity}")
-            self.proposal.key("column", meaning.column, self.joint.why.get(quantity, ""))
+            why = self.joint.why.get(quantity, "")
+            self.proposal.key("column", meaning.column, why, quantity not in self.joint.doubtful)
+            if meaning.column in self.clocks:
+                self.proposal.key("time", self.clocks[meaning.column], "a clock of its own")
             dimensions = (dimension_at(self.kind, quantity), "counts")
             if meaning.unit is not None and UNITS[meaning.unit].dimension in dimensions:
                 unit = meaning.unit
@@ -214,17 +228,30 @@ class _JointWriter:
 
     def _write_column(self, quantity: str, table: str = "", remark: str = "") -> None:
         column, why = self.joint.columns[quantity].column, self.joint.why.get(quantity, "")
+        limits = self.limits.get(column)
         self.used.append(column)
         table = table or quantity
         self.proposal.table(f"[joint.{table}]", f"{self.where}.{table}")
         reason = ", ".join(filter(None, (remark, why)))
-        self.proposal.key("column", column, reason, not remark and "no name" not in why)
+        self.proposal.key(
+            "column", column, reason, not remark and quantity not in self.joint.doubtful
+        )
+        if column in self.clocks:
+            self.proposal.key("time", self.clocks[column], "sampled by a clock of its own")
+        if limits is not None:
+            why = "outside lies one value, far from all others, as for missing readings"
+            self.proposal.key("range", limits, why, sure=False)
 
     def _write_counting(self, quantity: str) -> None:
         counter = self.counters[quantity]
         if counter.bits is not None:
             why = f"whole numbers up to 2^{counter.bits}, none in the middle: its sign was lost"
-            self.proposal.key("signed_bits", counter.bits, why)
+            sure = crosses_zero(self.logged[quantity])
+            why += "" if sure else "; but it jumps where the sign changes: another encoding?"
+            self.proposal.key("signed_bits", counter.bits, why, sure)
+        if counter.sign is not None:
+            why = f"a magnitude, and {2**counter.sign} more where negative: then it has no jumps"
+            self.proposal.key("sign_bit", counter.sign, why, sure=False)
         if counter.full is not None:
             why = "steps by so much from one row to the next: its counter wraps around"
             self.proposal.key("wraps_at", counter.full, why)
@@ -252,7 +279,7 @@ class _JointWriter:
         # With little gravity in the torque, its direction is an error of the other terms.
         shows_gravity = (
             fit is not None
-            and fit.explained >= FOLLOWS
+            and fit.proves
             and fit.gravity_share >= 0.3
             and fit.reach_rad >= swings_rad
         )
@@ -333,8 +360,9 @@ class _JointWriter:
         if fit is None:
             why = "positive torque must accelerate the angle upward; not visible in this log"
             self.proposal.key("sign", 1, why, sure=False)
-        elif fit.explained < FOLLOWS:
-            why = f"the motion explains {max(0.0, fit.explained):.0%} of the torque only"
+        elif not fit.proves:
+            why = f"the motion explains {max(0.0, fit.explained):.0%} of the torque"
+            why += f", and {max(0.0, fit.rival):.0%} of one shifted in time"
             self.proposal.key("sign", 1, why, sure=False)
         elif fit.backwards:
             why = "reversed, it accelerates the joint and overcomes its friction"

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from pipelines.importing.guess.names import TWIN, Meaning, in_counts
+from pipelines.importing.guess.names import SIDES, Meaning, in_counts
 from pipelines.importing.guess.torque import fit_torque
 from pipelines.importing.quantities.consistency import integral_agreement, likeliest_integrals
 from pipelines.importing.quantities.numbers import are_whole
@@ -26,6 +26,8 @@ class JointColumns:
     columns: Mapping[str, Meaning]
     why: Mapping[str, str]
     """Reasons for columns that were not chosen by name alone."""
+    doubtful: frozenset[str] = frozenset()
+    """Quantities whose column may be another one."""
     enabled: str | None = None
     """Column that is 1 while its drive is on, else 0."""
 
@@ -34,8 +36,9 @@ class JointColumns:
         """The quantity that shows best the torque or force of its drive, if any."""
         # Quantities that show the force of a prismatic joint's drive, the best first.
         sliding = ("force", "torque", "current", "voltage")
-        quantities = sliding if self.slides else TURNING
-        return next((quantity for quantity in quantities if quantity in self.columns), None)
+        known = [q for q in (sliding if self.slides else TURNING) if q in self.columns]
+        # A measured current shows more than a commanded torque.
+        return min(known, key=lambda quantity: self.columns[quantity].commanded, default=None)
 
     @property
     def slides(self) -> bool:
@@ -96,6 +99,30 @@ def group_joints(
     return sorted(joints if named else map(_with_reason_of_counts, joints), key=_place)
 
 
+def moving(
+    joints: Sequence[JointColumns], columns: Mapping[str, NDArray]
+) -> tuple[list[JointColumns], list[str]]:
+    """Return the joints that move, and the names of those that rest while others move.
+
+    Parameters
+    ----------
+    joints : sequence of JointColumns
+        All joints of the log.
+    columns : mapping of str to (n,) array
+        The columns.
+    """
+    # Least motion of a joint, relative to the joint that moves most: above the give of gears.
+    least = 0.01
+    reaches = [float(np.ptp(_known(columns[one.columns["angle"].column]))) for one in joints]
+    rests = [reach < least * max(reaches) for reach in reaches]
+    pairs = list(zip(joints, rests, strict=True))
+    return [one for one, rest in pairs if not rest], [one.name for one, rest in pairs if rest]
+
+
+def _known(values: NDArray) -> NDArray:
+    return values[np.isfinite(values)].astype(float)
+
+
 def _is_angle(meaning: Meaning) -> bool:
     return meaning.quantity == "angle" and not meaning.commanded
 
@@ -104,6 +131,11 @@ def _owner(meaning: Meaning, by_joint: Mapping[str, list[Meaning]]) -> str | Non
     """Return the joint of a column; without a name of its own it belongs to the only joint."""
     if meaning.joint in by_joint:
         return meaning.joint
+    # The knee's torque is of the joint knee_flexion, if no other joint is of the knee.
+    words = set(meaning.joint.split("_"))
+    alike = [name for name in by_joint if words & set(name.split("_")) - {"", *SIDES}]
+    if len(alike) == 1 and meaning.joint:
+        return alike[0]
     if "" in by_joint:
         return ""
     return next(iter(by_joint)) if len(by_joint) == 1 else None
@@ -137,7 +169,7 @@ def _counted(meaning: Meaning, values: NDArray) -> Meaning:
 def _with_reason_of_counts(joint: JointColumns) -> JointColumns:
     others = joint.why.get("angle")
     why = "no name contains angle, but this column is in counts" + (f", {others}" if others else "")
-    return replace(joint, why={**joint.why, "angle": why})
+    return replace(joint, why={**joint.why, "angle": why}, doubtful=joint.doubtful | {"angle"})
 
 
 def _switches(values: NDArray, rows: int) -> bool:
@@ -169,19 +201,31 @@ def _moves(values: NDArray, rows: int) -> bool:
 def _joint(key: str, members: Sequence[Meaning], number: int, joints: int) -> JointColumns:
     chosen: dict[str, Meaning] = {}
     why: dict[str, str] = {}
+    doubtful = set()
     for quantity in ("angle", "velocity", "reference", "temperature", *TURNING):
-        candidates = sorted((m for m in members if m.quantity == quantity), key=lambda m: m.rank)
-        if not candidates:
+        of_quantity = [m for m in members if m.quantity == quantity]
+        if not of_quantity:
             continue
-        chosen[quantity] = candidates[0]
-        others = [m.column for m in candidates[1:]]
+
+        def order(m: Meaning) -> tuple[bool, int]:
+            return m.joint not in (key, ""), m.rank
+
+        best, *others = sorted(of_quantity, key=order)
+        chosen[quantity] = best
+        reasons = []
+        if best.joint not in (key, "") and key:
+            reasons.append(f"its name says {best.joint}, the angle's {key}")
+        if others and order(others[0]) == order(best):
+            reasons.append("no name shows which")
+        if reasons:
+            doubtful.add(quantity)
         if others:
-            twin = TWIN.sub("", others[0]) == TWIN.sub("", candidates[0].column)
-            doubt = "no name shows which, " if twin else ""
-            why[quantity] = f"{doubt}rather than {', '.join(others)}"
+            reasons.append(f"rather than {', '.join(m.column for m in others)}")
+        why[quantity] = ", ".join(reasons)
     # Names in a map begin with a letter, so that joint 2 becomes joint2 there.
     named = key if key and key[0].isalpha() else ""
-    return JointColumns(named or (f"joint{number}" if joints > 1 else "joint"), chosen, why)
+    name = named or (f"joint{number}" if joints > 1 else "joint")
+    return JointColumns(name, chosen, why, frozenset(doubtful))
 
 
 def _by_behaviour(
@@ -211,6 +255,7 @@ def _by_behaviour(
         joint,
         columns={**joint.columns, "angle": angle, "velocity": velocity},
         why={**joint.why, **why},
+        doubtful=joint.doubtful | {"angle", "velocity"},
     )
     if joint.drive:
         return [joint]
@@ -243,7 +288,10 @@ def _with_torque(
     share, torque = max(shares, key=lambda one: one[0])
     why = f"no name, but it follows the motion best ({share:.0%} of its variance)"
     return replace(
-        joint, columns={**joint.columns, "torque": torque}, why={**joint.why, "torque": why}
+        joint,
+        columns={**joint.columns, "torque": torque},
+        why={**joint.why, "torque": why},
+        doubtful=joint.doubtful | {"torque"},
     )
 
 

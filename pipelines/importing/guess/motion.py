@@ -85,7 +85,7 @@ def guess_units(
         doubt = f"does not integrate to the angle ({share:.0%} of its variance)"
         return Units(unit, why, sure, velocity_named or VELOCITY_OF[unit], doubt, False)
     if unit == "counts":
-        units = Units(unit, why, sure, *_velocity_of_counts(velocity_named, agreement.slope))
+        units = Units(unit, why, sure, *_velocity_of_counts(velocity_named, agreement.slope, sure))
         of_velocity = UNITS[units.velocity]
         if of_velocity.dimension != "angular velocity":
             return units
@@ -94,12 +94,12 @@ def guess_units(
     return _from_slope(agreement, unit, why, sure, velocity_named)
 
 
-def _velocity_of_counts(named: str | None, slope: float) -> tuple[str, str, bool, int]:
+def _velocity_of_counts(named: str | None, slope: float, sure: bool) -> tuple[str, str, bool, int]:
     sign = int(np.sign(slope))
     if named:
         return named, FROM_NAME, True, sign
     if abs(abs(slope) - 1.0) < NEAR:
-        return "counts/s", f"integrates to {slope:.4g} of the angle", True, sign
+        return "counts/s", f"integrates to {slope:.4g} of the angle", sure, sign
     why = "the angle is in counts, so their slope does not show the velocity's unit"
     return "counts/s", why, False, sign
 
@@ -122,7 +122,9 @@ def _from_slope(
     same = [pair for pair in fitting if pair[0] == unit]
     if same:
         in_units = f"integrates to {sign * _turns(slope, *same[0]):.4g} {explained}"
-        return Units(unit, why, sure, same[0][1], in_units, True, sign)
+        # Units of which neither is known agree as well in degrees as in radians.
+        known = sure or velocity_named is not None
+        return Units(unit, why, sure, same[0][1], in_units, known, sign)
     if fitting and not sure:
         other, velocity = fitting[0]
         why = f"fits the velocity, which {reason}"
@@ -155,14 +157,12 @@ def _gear(slope: float, unit: str, velocity: str) -> float | None:
 
 
 def _angle_unit(angle: NDArray, named: str | None) -> tuple[str, str, bool]:
-    # Least reach of whole numbers that are surely counts, not degrees.
-    many = 100.0
     if named is not None:
         return named, FROM_NAME, True
     known = angle[np.isfinite(angle)]
     reach = float(np.max(np.abs(known)))
     if are_whole(known):
-        return "counts", "whole numbers only", reach > many
+        return "counts", "whole numbers: of an encoder, or parts of a degree or radian", False
     by_step = _by_encoder_step(known)
     if by_step is not None:
         return by_step
@@ -187,5 +187,7 @@ def _by_encoder_step(known: NDArray) -> tuple[str, str, bool] | None:
         bits = np.log2(turn / step)
         # Encoders have 10 to 24 bits. Coarser steps divide a turn into a power of two by chance.
         if 9.5 < bits < 24.5 and abs(bits - round(bits)) < 1e-3:
-            return unit, f"its steps of {step:.4g} make 2^{round(bits)} of a turn in {unit}", True
+            # Fixed-point numbers of any unit have steps of 2^-k, as parts of a turn have.
+            why = f"its steps of {step:.4g} make 2^{round(bits)} of a turn in {unit}"
+            return unit, why, unit != "rev"
     return None

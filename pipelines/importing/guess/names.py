@@ -34,9 +34,13 @@ WORDS: dict[str, frozenset[str]] = {
     }.items()
 }
 """Words for each quantity, English, German and French; the first that matches a name counts."""
+ROTATIONS = _words("flexion extension adduction abduction rotation pronation supination tilt")
+"""Words of an angle that are part of its joint's name."""
+SIDES = _words("l r left right links rechts gauche droite")
+"""Sides of the body, which many joints share."""
 COMMANDED = _words(
-    "ref reference goal des desired cmd command commanded con target set setpoint sp qg soll"
-    " sollwert consigne"
+    "ref reference goal des cmd command commanded con target set setpoint sp qg soll sollwert"
+    " consigne demand demanded desired planned request requested trajectory vorgabe"
 )
 FILTERED = _words("filt filtered lp smooth smoothed gefiltert filtre")
 MEASURED = _words("meas measured act actual msr fb feedback ist istwert mesure mesuree reel reelle")
@@ -177,7 +181,7 @@ def _quantity(words: set[str]) -> str:
     """Return the quantity of some words, empty where unknown."""
     quantities = [quantity for quantity, known in WORDS.items() if known & words]
     if not quantities:
-        return ""
+        return "angle" if words & ROTATIONS else ""
     # "Current" may mean present, as in "current position".
     others = [one for one in quantities if WORDS[one] & words - SYMBOLS - {"current"}]
     return others[0] if "current" in words and others else quantities[0]

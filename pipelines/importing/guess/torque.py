@@ -17,6 +17,8 @@ class TorqueFit:
 
     explained: float
     """Share of the torque's variance that the fit explains."""
+    rival: float
+    """The same of a wrong torque: this one, shifted in time."""
     inertia: float
     friction: float
     """Torque per rad/s², and Coulomb friction; in the torque's own unit."""
@@ -26,6 +28,13 @@ class TorqueFit:
     """RMS of gravity's torque relative to that of the whole torque."""
     reach_rad: float
     """Range of the angle, rad; in a small range gravity resembles a constant torque."""
+
+    @property
+    def proves(self) -> bool:
+        """Whether it explains clearly more than the fit of a wrong torque."""
+        # Least share of the torque's variance that the motion must explain.
+        follows = 0.7
+        return self.explained >= follows and 1.0 - self.explained < 0.5 * (1.0 - self.rival)
 
     @property
     def backwards(self) -> bool:
@@ -77,11 +86,17 @@ def fit_torque(time_s: NDArray, angle_rad: NDArray, torque: NDArray) -> TorqueFi
     ]
     tau = mean[regular]
     # In a small motion cos q is nearly constant. The solution of least norm is then still unique.
-    a, b, c, d, e = np.linalg.lstsq(Y, tau, rcond=1e-8)[0]
-    residual = tau - Y @ np.array([a, b, c, d, e])
+    # Of a single sine any torque of the same period is explained: such a fit shows no sign.
+    shifts = [round(share * len(tau)) for share in (0.13, 0.29, 0.41, 0.59, 0.71)]
+    wrong = np.column_stack([np.roll(tau, shift) for shift in shifts])
+    solution = np.linalg.lstsq(Y, np.column_stack([tau, wrong]), rcond=1e-8)[0]
+    residuals = np.column_stack([tau, wrong]) - Y @ solution
+    explained = 1.0 - np.var(residuals, axis=0) / np.var(tau)
+    a, b, c, d, _ = solution[:, 0]
     gravity = Y[:, 2:4] @ np.array([c, d])
     return TorqueFit(
-        explained=1.0 - float(np.var(residual) / np.var(tau)),
+        explained=float(explained[0]),
+        rival=float(np.median(explained[1:])),
         inertia=float(a),
         friction=float(b),
         # Both terms together are A sin(q - down), A > 0: the drive must lift the joint away from

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from pipelines.importing.finding import Note, counted
 from pipelines.importing.quantities.expression import Expression
 from pipelines.importing.quantities.numbers import TAKEN_FOR_MISSING, numbers
-from pipelines.importing.quantities.wraparound import full_at, signed, unwrapped
+from pipelines.importing.quantities.wraparound import full_at, signed, unwrapped, with_sign_bit
 from pipelines.settings.import_map import ReadingSettings
 from pipelines.settings.units import Unit
 
@@ -50,6 +50,8 @@ def quantity(
     raw = _raw(reading, columns, where, note)
     if reading.signed_bits is not None:
         raw = signed(raw, reading.signed_bits, note)
+    if reading.sign_bit is not None:
+        raw = with_sign_bit(raw, reading.sign_bit, note)
     # After the sign, as limits are of signed readings. Before unwrapping, because an impossible
     # reading would count as a wraparound.
     if reading.range is not None:

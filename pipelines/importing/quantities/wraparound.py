@@ -51,6 +51,76 @@ def signed(values: NDArray, bits: int, note: Note = unnoted) -> NDArray:
     return np.where(impossible, np.nan, np.where(negative, values - 2.0**bits, values))
 
 
+def with_sign_bit(values: NDArray, bit: int, note: Note = unnoted) -> NDArray:
+    """Return the values of a register that holds a magnitude, and a bit that is set below zero.
+
+    Parameters
+    ----------
+    values : (n,) array
+        Readings, ``2**bit`` and more where negative.
+    bit : int
+        Number of the bit; 15 is the highest of 16.
+    note : callable
+        Takes what is reported about the register.
+
+    Returns
+    -------
+    (n,) array
+        Readings with their sign.
+    """
+    negative = values >= 2.0**bit
+    if negative.any():
+        note(f"bit {bit} is the sign, set in {np.mean(negative):.0%} of the rows", "turned round")
+    return np.where(negative, 2.0**bit - values, values)
+
+
+def sign_bit(values: NDArray) -> int | None:
+    """Return the bit that is the sign of a register of magnitudes; None for other columns.
+
+    Readings are whole and never negative. Once turned round they go on without the steps by
+    ``2**bit`` that they have as logged, and no magnitude comes near that bit.
+
+    Parameters
+    ----------
+    values : (n,) array
+        Readings, NaN where missing.
+    """
+    known = values[np.isfinite(values)]
+    if len(known) < 2 or np.any(known < 0) or np.any(known != np.round(known)):
+        return None
+    bit = int(np.log2(max(float(np.max(known)), 1.0)))
+    decoded = with_sign_bit(known, bit)
+    same = np.sign(decoded[1:]) == np.sign(decoded[:-1])
+    steps = np.abs(np.diff(decoded))
+    if bit < 7 or not same.any() or same.all():
+        return None
+    # Steps across zero are no larger than twice those to one side of it.
+    usual = 2.0 * float(np.max(steps[same])) + 2.0
+    room = 2.0**bit - float(np.max(np.abs(decoded)))
+    return bit if np.max(steps[~same]) <= usual < room else None
+
+
+def fill_value(values: NDArray) -> float | None:
+    """Return a value that stands for missing readings, such as -999 or 1e30; None without one.
+
+    It is the lowest or highest reading, the same in all its rows, fewer than half of them, and
+    farther from all others than these are from each other.
+
+    Parameters
+    ----------
+    values : (n,) array
+        Readings, NaN where missing.
+    """
+    known = values[np.isfinite(values)]
+    for value in (np.min(known), np.max(known)) if len(known) else ():
+        others = known[known != value]
+        if len(others) <= len(known) / 2 or np.ptp(others) == 0.0:
+            continue
+        if np.min(np.abs(others - value)) > np.ptp(others):
+            return float(value)
+    return None
+
+
 def unwrapped(values: NDArray, modulus: float, note: Note = unnoted, near: float = 0.0) -> NDArray:
     """Return a counter without its wraparounds, so that no step exceeds half the modulus.
 
@@ -117,10 +187,15 @@ def full_at(values: NDArray, turns: Iterable[float]) -> float | None:
     if not far.any() or far.all():
         return None
     moved = 1.5 * float(np.max(steps[~far]))
+    reach = float(np.ptp(known))
     whole = bool(np.all(known == np.round(known)))
     for modulus in sorted((*turns, *(REGISTERS if whole else ()))):
         # Motion must be slow against the modulus, or its own steps look like wraparounds. The
-        # median tolerates single outliers.
-        if moved < 0.25 * modulus and np.median(np.abs(steps[far] - modulus)) <= moved:
+        # median tolerates single outliers. No reading of a counter lies beyond its modulus.
+        if (
+            moved < 0.25 * modulus
+            and np.median(np.abs(steps[far] - modulus)) <= moved
+            and reach <= modulus + moved
+        ):
             return modulus
     return None

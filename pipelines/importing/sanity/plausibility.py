@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from pipelines.contracts.joints import in_words
 from pipelines.importing.finding import Finding, counted
 from pipelines.importing.quantities.consistency import MOST, SPAN, integral_agreement, whole_rows
+from pipelines.importing.quantities.wraparound import fill_value
 from pipelines.mechanics.machine import known_in_words, mechanisms_of
 from pipelines.settings.import_map import ImportMap, JointSettings
 
@@ -81,6 +82,12 @@ def _slips(columns: Mapping[str, NDArray], joint: JointSettings) -> Iterator[Fin
     far_off = 20.0
     for quantity in ("angle", "torque"):
         name = joint.joint.column(quantity)
+        filler = fill_value(columns[name])
+        if filler is not None:
+            count = counted(int(np.count_nonzero(columns[name] == filler)), "row")
+            seen = f"is exactly {filler:.6g} in {count}, far from all others"
+            yield Finding(name, seen, "kept; if it marks missing readings, set a range")
+            continue
         # Median and quantile: an outlier must not widen the range that it is judged by.
         some = _every_kth(columns[name])
         middle = float(np.median(some))
