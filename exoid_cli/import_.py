@@ -21,7 +21,8 @@ def import_(
     files: Annotated[
         list[Path],
         typer.Argument(
-            metavar="FILE", help="Logs: CSV, .mat, Parquet, JSON, HDF5, MCAP, ROS 2 bags."
+            metavar="FILE",
+            help="Logs: text, .mat, .tdms, .xlsx, .npz, Parquet, JSON, HDF5, MDF, ROS bags.",
         ),
     ],
     map_: Annotated[
@@ -80,6 +81,7 @@ def _import(files: list[Path], map_: Path, output: Path) -> None:
     few = 3
     from pipelines.contracts.atomic import folder_to_fill, leftovers
     from pipelines.importing.sanity.leftover_recordings import unused
+    from pipelines.importing.sources.joined import firsts
     from pipelines.settings.import_map import load_map
 
     if output.suffix == ".parquet":
@@ -88,6 +90,7 @@ def _import(files: list[Path], map_: Path, output: Path) -> None:
             f' -o {output.parent}; name = "{output.stem}" at [[recording]] in the map names one'
         )
     settings = load_map(map_)
+    files = firsts(files, settings.source.join)
     for leftover in leftovers(output) if output.is_dir() else []:
         console.warn(
             f"{leftover}: temporary file of an import that was killed or still runs; remove it"

@@ -1,6 +1,6 @@
 """A log with the columns that a map names: the runs of its clock, and its quantities."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -205,6 +205,7 @@ def read_log(source: Source, settings: ImportMap, map_path: Path) -> Log:
     # A clock that is the same as that of the log is none of the channel's own.
     same = {name for name in clocks - {None} if np.array_equal(columns[name], columns[column])}
     channels = tuple(replace(one, time=None) if one.time in same else one for one in channels)
+    _check_switches(channels, source, {column, *same})
     columns = _as_numbers(columns, clocks, findings)
     stamps = clock.stamps(columns[column], column, settings.time, note)
     origin = clock.first_stamp(stamps)
@@ -243,6 +244,17 @@ def _clock(reading: ReadingSettings, where: str, settings: ImportMap, source: So
         names = ", ".join(sorted(map(str, own)))
         raise SettingsError(f"{where}.expression: mixes columns of the clocks {names}; use one")
     return next(iter(own - {settings.time.column}), None)
+
+
+def _check_switches(channels: Sequence[Channel], source: Source, same: set[str | None]) -> None:
+    """Refuse a switch that was sampled by another clock: its rows are not those of the log."""
+    for channel in channels:
+        of_switch = source.clocks.get(str(channel.enabled))
+        if of_switch is not None and of_switch not in same:
+            raise InputError(
+                f"{channel.enabled!r} has a clock of its own, {of_switch!r}; joint.enabled needs"
+                " a column with the clock of the log"
+            )
 
 
 def _needed(channels: tuple[Channel, ...], time: TimeSettings) -> dict[str, str]:

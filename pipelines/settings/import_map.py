@@ -55,6 +55,16 @@ class SourceSettings(Settings):
             )
         return delimiter
 
+    @field_validator("join")
+    @classmethod
+    def _is_of_runs(cls, join: tuple[str, ...] | None) -> tuple[str, ...] | None:
+        stars = {pattern.count("*") for pattern in join or ()}
+        if join and (len(set(join)) < len(join) or len(stars) > 1 or max(stars) > 1):
+            raise ValueError(
+                f'found {", ".join(join)}, expected different names, with one "*" in each or none'
+            )
+        return join
+
 
 class TimeSettings(Settings):
     """The clock."""
@@ -305,6 +315,8 @@ class ImportMap(Settings):
             raise ValueError(
                 f"force: found {target} twice, expected each axis of a cuff once; remove one"
             )
+        if self.source.join is not None and self.time.column is None:
+            raise ValueError("source.join: needs time.column, the clock that each file has")
         owners: dict[str, str] = {}
         for place, reading in self.readings():
             if reading.time is not None and self.time.column is None:

@@ -18,15 +18,14 @@ from pipelines.importing.guess.joints import (
     order_is_known,
 )
 from pipelines.importing.guess.names import Meaning, meaning
+from pipelines.importing.guess.parts import Join, opened, runs_to_join
 from pipelines.importing.guess.proposal import Proposal
 from pipelines.importing.guess.time import TimeGuess, guess_time, runs_of, write_time
 from pipelines.importing.quantities.numbers import numbers, whole_nanoseconds
 from pipelines.importing.quantities.wraparound import fill_value
-from pipelines.importing.sources.open import open_source
 from pipelines.importing.sources.source import Columns, Source
 from pipelines.importing.time import clock
 from pipelines.importing.time.period import repeats_after
-from pipelines.settings.import_map import SourceSettings
 from pipelines.settings.units import unit_named
 
 TRAIN = 0.7
@@ -43,15 +42,16 @@ def propose(paths: Sequence[Path]) -> Proposal:
     InputError
         If a file cannot be read, has other columns than the first, or has no clock or angle.
     """
+    paths, join = runs_to_join(paths)
     with about(paths[0]):
-        source = open_source(paths[0], SourceSettings())
+        source = opened(paths[0], join)
         columns, typed = _typed_columns(source)
         names = _meanings(source)
         time = guess_time(_clock_first(names, source), columns, typed)
         if time is None:
             raise InputError(_no_clock(names, columns))
     for path in paths[1:]:
-        _check_columns(path, source)
+        _check_columns(path, source, join)
     clocks = _onto_one_clock(source, time.column, columns)
     columns[time.column] = time.stamps(columns[time.column])
     # Within one run, because integrals and fits across a restart of the clock mean nothing.
@@ -76,6 +76,9 @@ def propose(paths: Sequence[Path]) -> Proposal:
     proposal.remark("Check values that are UNSURE. FILL IN values that no log holds.")
     for note in source.notes:
         proposal.remark(f"Read as {source.format}: {note}.")
+    if join is not None:
+        proposal.table("[source]", "source")
+        proposal.key("join", list(join.patterns), "files of one run; their columns differ")
     write_time(proposal, time)
     used = {time.column}
     joints, resting = moving(joints, of_run)
@@ -87,7 +90,7 @@ def propose(paths: Sequence[Path]) -> Proposal:
         rests = f"{', '.join(resting)} rest while others move, and are left out"
         proposal.doubt("joint", f"{rests}; with them, name their columns too")
     _write_geometry(proposal, joints)
-    _write_recordings(proposal, paths, [_period(path, time, joints) for path in paths])
+    _write_recordings(proposal, paths, [_period(path, join, time, joints) for path in paths])
     _write_unused(proposal, [name for name in source.names if name not in used], columns)
     return proposal
 
@@ -131,6 +134,8 @@ def _onto_one_clock(source: Source, column: str, columns: Columns) -> dict[str, 
     stamps = columns[column].astype(float)
     own: dict[str, str] = {}
     for name, clock_name in source.clocks.items():
+        if name not in columns:
+            continue
         at, values = columns[clock_name], columns[name]
         numeric = {at.dtype.kind, values.dtype.kind} <= set("biuf")
         if clock_name == column or not numeric or np.array_equal(at, columns[column]):
@@ -168,9 +173,9 @@ def _no_clock(names: Sequence[Meaning], columns: Mapping[str, NDArray]) -> str:
     )
 
 
-def _check_columns(path: Path, first: Source) -> None:
+def _check_columns(path: Path, first: Source, join: Join | None) -> None:
     with about(path):
-        missing = set(first.names) - set(open_source(path, SourceSettings()).names)
+        missing = set(first.names) - set(opened(path, join).names)
         if missing:
             raise InputError(
                 f"has no column {', '.join(sorted(missing))}, which {first} has; guess its own map"
@@ -225,13 +230,18 @@ def _write_geometry(proposal: Proposal, joints: Sequence[JointColumns]) -> None:
         )
 
 
-def _period(path: Path, time: TimeGuess, joints: Sequence[JointColumns]) -> float | None:
+def _period(
+    path: Path, join: Join | None, time: TimeGuess, joints: Sequence[JointColumns]
+) -> float | None:
     """Return the period of the motion in a file, s; of its set-points where these were logged."""
     names = {
         m.column for joint in joints for quantity, m in joint.columns.items() if quantity in MOTION
     }
     with about(path):
-        columns = open_source(path, SourceSettings()).load([time.column, *names])
+        source = opened(path, join)
+        own = [source.clocks[name] for name in names if name in source.clocks]
+        columns = source.load([time.column, *names, *own])
+    _onto_one_clock(source, time.column, columns)
     motion = {name: _numeric(columns[name]) for name in names}
     logged = columns[time.column]
     stamps = time.stamps(whole_nanoseconds(logged) if time.unit == "iso8601" else _numeric(logged))

@@ -8,7 +8,13 @@ from numpy.typing import NDArray
 from pipelines.importing.finding import Note, counted
 from pipelines.importing.quantities.expression import Expression
 from pipelines.importing.quantities.numbers import TAKEN_FOR_MISSING, numbers
-from pipelines.importing.quantities.wraparound import full_at, signed, unwrapped, with_sign_bit
+from pipelines.importing.quantities.wraparound import (
+    full_at,
+    sign_bit,
+    signed,
+    unwrapped,
+    with_sign_bit,
+)
 from pipelines.settings.import_map import ReadingSettings
 from pipelines.settings.units import Unit
 
@@ -52,6 +58,9 @@ def quantity(
         raw = signed(raw, reading.signed_bits, note)
     if reading.sign_bit is not None:
         raw = with_sign_bit(raw, reading.sign_bit, note)
+    elif reading.signed_bits is None and (bit := sign_bit(raw)) is not None:
+        seen = f"jumps by 2^{bit} between small numbers, as a magnitude with a sign bit does"
+        note(seen, f"kept; set sign_bit = {bit} if that is so")
     # After the sign, as limits are of signed readings. Before unwrapping, because an impossible
     # reading would count as a wraparound.
     if reading.range is not None:

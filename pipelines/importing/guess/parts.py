@@ -1,0 +1,77 @@
+"""Find out whether files are the parts of runs, to be joined by their clocks."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from pipelines.errors import about
+from pipelines.importing.guess.joints import TURNING
+from pipelines.importing.guess.names import meaning
+from pipelines.importing.sources.joined import firsts, joined, parts_of
+from pipelines.importing.sources.open import open_source
+from pipelines.importing.sources.source import Source
+from pipelines.settings.import_map import SourceSettings
+
+
+@dataclass(frozen=True)
+class Join:
+    """Files of one run."""
+
+    patterns: tuple[str, ...]
+    clock: str
+
+
+def opened(path: Path, join: Join | None) -> Source:
+    """Return the log in a file, or in the files of a run."""
+    if join is None:
+        return open_source(path, SourceSettings())
+    parts = parts_of(path, join.patterns)
+    return joined([open_source(part, SourceSettings()) for part in parts], join.clock)
+
+
+def runs_to_join(paths: Sequence[Path]) -> tuple[list[Path], Join | None]:
+    """Return the first file of each run, and how its files are joined if they are several.
+
+    Files whose columns differ but for the clock are parts of a run.
+    """
+    kinds: dict[tuple[str, ...], list[Path]] = {}
+    for path in paths if len(paths) > 1 else ():
+        with about(path):
+            kinds.setdefault(open_source(path, SourceSettings()).names, []).append(path)
+    meanings = [[meaning(name) for name in names] for names in kinds]
+    common = set.intersection(*(set(names) for names in kinds)) if kinds else set()
+    clocks = [m for m in meanings[0] if m.column in common] if meanings else []
+    patterns = _patterns(list(kinds.values()))
+    if len(kinds) < 2 or patterns is None or [m.quantity for m in clocks] != ["time"]:
+        return list(paths), None
+    # The torque's clock first: angles are smooth, so that it is they that are interpolated.
+    drives = [any(m.quantity in TURNING for m in names) for names in meanings]
+    order = sorted(range(len(kinds)), key=lambda k: not drives[k])
+    join = Join(tuple(patterns[k] for k in order), clocks[0].column)
+    return firsts(paths, join.patterns), join
+
+
+def _patterns(kinds: Sequence[Sequence[Path]]) -> list[str] | None:
+    """Return the names of the files of each kind, with * for the run; None if runs do not show."""
+    if len({len(paths) for paths in kinds}) != 1:
+        return None
+    if all(len(paths) == 1 for paths in kinds):
+        return [paths[0].name for paths in kinds]
+    patterns, runs = [], []
+    for paths in kinds:
+        names = [path.name for path in paths]
+        begin = _common_start(names)
+        end = _common_start([name[len(begin) :][::-1] for name in names])[::-1]
+        patterns.append(f"{begin}*{end}")
+        runs.append({name[len(begin) : len(name) - len(end)] for name in names})
+    return patterns if all(run == runs[0] for run in runs) else None
+
+
+def _common_start(names: Sequence[str]) -> str:
+    """Return the letters with which all names begin."""
+    same = 0
+    for letters in zip(*names, strict=False):
+        if len(set(letters)) > 1:
+            break
+        same += 1
+    return names[0][:same]

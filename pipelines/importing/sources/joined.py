@@ -1,0 +1,99 @@
+"""One run in several files, joined by their clocks."""
+
+import re
+from collections.abc import Sequence
+from pathlib import Path
+
+from pipelines.errors import InputError, about
+from pipelines.importing.sources.source import Columns, Source
+
+
+def firsts(files: Sequence[Path], join: Sequence[str] | None) -> list[Path]:
+    """Return the first file of each run that the files are of, each once.
+
+    Parameters
+    ----------
+    files : sequence of Path
+        Files that the user gives; any of a run stands for it.
+    join : sequence of str or None
+        Patterns of the files of a run; None where each file is a run.
+
+    Raises
+    ------
+    InputError
+        If a file fits none of the patterns.
+    """
+    if join is None:
+        return list(files)
+    return list(dict.fromkeys(parts_of(file, join)[0] for file in files))
+
+
+def parts_of(file: Path, join: Sequence[str]) -> list[Path]:
+    """Return the files of the run that a file is of, in the order of the patterns.
+
+    Raises
+    ------
+    InputError
+        If the file fits none of the patterns.
+    """
+    for pattern in join:
+        run = re.fullmatch(re.escape(pattern).replace(r"\*", "(.*)"), file.name)
+        if run is not None:
+            name = run[1] if run.groups() else ""
+            return [file.with_name(other.replace("*", name)) for other in join]
+    raise InputError(
+        f"{file}: is none of the files {', '.join(join)}, which source.join in the map names"
+    )
+
+
+def joined(sources: Sequence[Source], clock: str) -> Source:
+    """Return the files of one run as one log.
+
+    Columns of the other files keep their names, or get the number of the file if the name is taken:
+    ``t#2``. Their clock is that of their own file.
+
+    Parameters
+    ----------
+    sources : sequence of Source
+        The files of a run.
+    clock : str
+        The column of the clock, which each file has.
+
+    Raises
+    ------
+    InputError
+        If a file has no such column.
+    """
+    places: dict[str, tuple[Source, str]] = {}
+    clocks: dict[str, str] = {}
+    units: dict[str, str] = {}
+    for number, source in enumerate(sources, 1):
+        if clock not in source.names:
+            with about(source.path):
+                raise InputError(f"has no column {clock!r}, the clock by which files are joined")
+        called = {name: f"{name}#{number}" if name in places else name for name in source.names}
+        places |= {called[name]: (source, name) for name in source.names}
+        units |= {called[name]: unit for name, unit in source.units.items()}
+        clocks |= {called[name]: called[clock] for name in source.names if name != clock}
+        clocks |= {called[name]: called[own] for name, own in source.clocks.items()}
+
+    def load(names: Sequence[str]) -> Columns:
+        columns: Columns = {}
+        for source in sources:
+            own = {name: places[name][1] for name in names if places[name][0] is source}
+            loaded = source.load(list(own.values()))
+            columns |= {name: loaded[inner] for name, inner in own.items()}
+        return columns
+
+    first, *others = sources
+    remark = f"joined with {', '.join(one.path.name for one in others)} by the clock {clock!r}"
+    return Source(
+        first.path,
+        first.format,
+        tuple(places),
+        load,
+        (*first.notes, remark),
+        units=units,
+        clocks=clocks,
+        remarks=(*(remark for one in sources for remark in one.remarks), remark),
+    )
