@@ -203,7 +203,7 @@ def read_log(source: Source, settings: ImportMap, map_path: Path) -> Log:
     column = settings.time.column
     clocks = {channel.time for channel in channels} | {column}
     # A clock that is the same as that of the log is none of the channel's own.
-    same = {name for name in clocks - {None} if np.array_equal(columns[name], columns[column])}
+    same = {name for name in clocks if name and np.array_equal(columns[name], columns[column])}
     channels = tuple(replace(one, time=None) if one.time in same else one for one in channels)
     _check_switches(channels, source, {column, *same})
     columns = _as_numbers(columns, clocks, findings)
@@ -246,7 +246,7 @@ def _clock(reading: ReadingSettings, where: str, settings: ImportMap, source: So
     return next(iter(own - {settings.time.column}), None)
 
 
-def _check_switches(channels: Sequence[Channel], source: Source, same: set[str | None]) -> None:
+def _check_switches(channels: Sequence[Channel], source: Source, same: set[str]) -> None:
     """Refuse a switch that was sampled by another clock: its rows are not those of the log."""
     for channel in channels:
         of_switch = source.clocks.get(str(channel.enabled))

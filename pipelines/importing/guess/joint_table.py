@@ -290,7 +290,7 @@ class _JointWriter:
         down = float(np.angle(-np.exp(1j * fit.down_rad))) if fit.backwards else fit.down_rad
         if abs(down) < hangs_rad:
             why = f"gravity's torque vanishes at {down:.2f} rad: zero hangs down"
-            self.proposal.key("zero", 0.0, why)
+            self.proposal.key("zero", 0.0, why, self.units.sure)
             return
         zero = round(down * TURNS[self.units.angle] / (2.0 * np.pi), 3)
         why = f"by gravity's torque the joint would hang there ({fit.explained:.0%} fits)"

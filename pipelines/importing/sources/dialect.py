@@ -133,7 +133,8 @@ def _encoding(start: bytes) -> str:
             return encoding
     nuls = start.count(b"\0")
     for first, encoding in ((0, "utf-16-be"), (1, "utf-16-le")):
-        if nuls > 0.9 * (len(start) // 2) == start[first::2].count(b"\0"):
+        # Of letters below 256, one byte of two is NUL.
+        if start[first::2].count(b"\0") == nuls > 0.9 * (len(start) // 2):
             return encoding
     if nuls and not _is_stray(nuls, start):
         raise InputError(
@@ -279,7 +280,7 @@ def _blocks(
         numbers = [_looks_like_number(field) for field in inside if not _is_missing(field)]
         if len(fields) >= width and all(numbers) and _are_numbers(fields, decimal):
             blocks[-1].append((k, fields))
-        elif len(numbers) > 1 and not any(numbers) and tuple(fields) not in heads:
+        elif len(numbers) == len(numeric) > 1 and not any(numbers) and tuple(fields) not in heads:
             heads.add(tuple(fields))
             blocks.append([])
     return tuple(tuple(block) for block in sorted(blocks, key=len, reverse=True) if block)

@@ -1,5 +1,6 @@
 """Logs of LabVIEW in .tdms."""
 
+import logging
 from pathlib import Path
 from typing import Any
 
@@ -26,6 +27,12 @@ def open_tdms(path: Path, settings: SourceSettings) -> Source:
     columns: Columns = {}
     units: dict[str, str] = {}
     clocks: dict[str, str] = {}
+    warnings: list[str] = []
+    handler = logging.Handler()
+    handler.emit = lambda record: warnings.append(record.getMessage())  # type: ignore[method-assign]
+    # The library logs to the terminal that a file was cut.
+    nptdms.log.log_manager.console_handler.setLevel(logging.CRITICAL)
+    logging.getLogger("nptdms").addHandler(handler)
     try:
         with nptdms.TdmsFile.open(path) as file:
             for group in file.groups():
@@ -34,8 +41,14 @@ def open_tdms(path: Path, settings: SourceSettings) -> Source:
                         _add(channel, group.name, columns, units, clocks)
     except Exception as error:  # the library raises errors of any class for a damaged file
         raise InputError(f"is a damaged .tdms file ({error}); copy it again") from error
+    finally:
+        logging.getLogger("nptdms").removeHandler(handler)
+    if warnings and not columns:
+        raise InputError(f"is a damaged .tdms file ({warnings[0]}); copy it again")
     clocks = clocks_of(columns, "/") | clocks
-    return Source.in_memory(path, "TDMS", columns, units=units, clocks=clocks)
+    return Source.in_memory(
+        path, "TDMS", columns, units=units, clocks=clocks, remarks=tuple(warnings)
+    )
 
 
 def _add(

@@ -1,0 +1,272 @@
+"""The layout of a file is read, whatever the tool that wrote it."""
+
+import numpy as np
+import pytest
+import scipy.io
+from numpy.testing import assert_allclose
+
+from pipelines.errors import InputError
+from pipelines.importing.quantities.numbers import numbers
+from pipelines.importing.sources.open import open_source
+from pipelines.settings.import_map import SourceSettings
+from tests.importing.conftest import MAP
+
+NAMES = ("time", "angle", "velocity", "torque")
+
+
+@pytest.fixture(scope="module")
+def table():
+    """A hundred rows of a swing, as texts with five decimals."""
+    time = np.arange(100) / 100.0
+    angle, velocity = np.sin(4.0 * time), 4.0 * np.cos(4.0 * time)
+    values = np.column_stack([time, angle, velocity, 0.3 * velocity - angle])
+    return [[f"{value:.5f}" for value in row] for row in values]
+
+
+@pytest.fixture
+def read(tmp_path):
+    """Write lines to a file and return its columns as numbers."""
+
+    def call(lines, name="log.csv", encoding="utf-8", **settings):
+        path = tmp_path / name
+        path.write_bytes("\n".join([*lines, ""]).encode(encoding))
+        source = open_source(path, SourceSettings(**settings))
+        columns = source.load(source.names)
+        return source, {name: numbers(values) for name, values in columns.items()}
+
+    return call
+
+
+def assert_same(columns, table, names=NAMES):
+    truth = np.array(table, dtype=float).T
+    for name, values in zip(names, truth, strict=True):
+        assert_allclose(columns[name], values, atol=1e-12)
+
+
+def joined(rows, delimiter=",", tail="", decimal="."):
+    return [delimiter.join(field.replace(".", decimal) for field in row) + tail for row in rows]
+
+
+@pytest.mark.parametrize(
+    ("above", "delimiter", "tail"),
+    [
+        (["Gain,1.0,1.0,1.0", "time,angle,velocity,torque"], ",", ""),
+        (["Samples,100", "100,4", "# time,angle,velocity,torque"], ",", ""),
+        (["// rate, 100, Hz", "// time, angle, velocity, torque"], ",", ""),
+        (["time,angle,velocity,torque"], ",", ","),
+        (["time,angle,velocity,torque,"], ",", ""),
+        (["time,angle,velocity,torque,,"], ",", ",,"),
+        (["time,angle,velocity,torque,Comment"], ",", ""),
+        (["nRows=100", "nColumns=4", "endheader", "time\tangle\tvelocity\ttorque"], "\t", ""),
+        (['"time";"angle";"velocity";"torque"'], ";", ""),
+        (["   time  angle   velocity  torque"], " ", ""),
+    ],
+    ids=lambda value: value[-1] if isinstance(value, list) else repr(value),
+)
+def test_data_begin_where_rows_of_numbers_go_on_and_names_are_above(
+    read, table, above, delimiter, tail
+):
+    _, columns = read([*above, *joined(table, delimiter, tail)])
+    assert_same(columns, table)
+
+
+def test_row_numbers_without_a_name_are_a_column_of_their_own_and_said(read, table):
+    """As R writes a table: a header one name short of the rows."""
+    rows = [[f'"{k}"', *row] for k, row in enumerate(table, 1)]
+    source, columns = read(['"time" "angle" "velocity" "torque"', *joined(rows, " ")])
+    assert_same(columns, table)
+    assert source.remarks == ("row numbers have no name; called row",)
+
+
+def test_a_header_that_fits_no_rows_is_named_with_the_column_that_is_missing(
+    imported, table, tmp_path
+):
+    path = tmp_path / "log.csv"
+    path.write_text("\n".join(["time,angle", *joined(table)]))
+    outcome = imported(path)
+    assert outcome.code == 2
+    assert (
+        "the header 'time, angle' has 2 names, the rows 4 fields: name them in source.columns"
+        in outcome.err
+    )
+
+
+@pytest.mark.parametrize("encoding", ["utf-16", "utf-16-le", "utf-16-be", "cp1252"])
+def test_any_encoding_of_an_editor_is_read(read, table, encoding):
+    _, columns = read(["at 20 °C", ";".join(NAMES), *joined(table, ";")], encoding=encoding)
+    assert_same(columns, table)
+
+
+@pytest.mark.parametrize("cell", ["ERR", "#DIV/0!", "1,#QNAN0"])
+def test_a_text_among_decimal_commas_costs_its_row_only(read, table, cell):
+    rows = joined(table, ";", decimal=",")
+    rows[50] = ";".join([*rows[50].split(";")[:3], cell])
+    _, columns = read([";".join(NAMES), *rows, "EOF"])
+    assert np.flatnonzero(np.isnan(columns["torque"])).tolist() == [50, 100]
+    assert_same({name: values[:50] for name, values in columns.items()}, table[:50])
+
+
+@pytest.mark.parametrize(("decimal", "mark"), [(",", "."), (".", ",")])
+def test_marks_between_thousands_are_no_decimal_points(read, table, decimal, mark):
+    torques = [f"{2e6 + 1e6 * k:,.2f}" for k in range(len(table))]
+    swapped = str.maketrans({",": mark, ".": decimal})
+    rows = [
+        ";".join([*(field.translate(swapped) for field in row[:3]), torque.translate(swapped)])
+        for row, torque in zip(table, torques, strict=True)
+    ]
+    _, columns = read([";".join(NAMES), *rows])
+    assert_allclose(columns["torque"], 2e6 + 1e6 * np.arange(len(table)))
+    assert_allclose(columns["angle"], np.array(table, dtype=float)[:, 1])
+
+
+def test_three_decimals_after_a_comma_are_no_thousands(read):
+    rows = [f"{k},{k:03d};{k + 1},250;{k + 2},125" for k in range(1, 60)]
+    _, columns = read(["time;angle;torque", *rows])
+    assert columns["torque"][0] == 3.125
+
+
+def test_a_header_that_comes_again_is_no_second_table(read, table):
+    head = ",".join(NAMES)
+    _, columns = read([head, *joined(table[:50]), head, *joined(table[50:])])
+    kept = {name: values[np.isfinite(values)] for name, values in columns.items()}
+    assert_same(kept, table)
+
+
+@pytest.mark.parametrize("rows", [100, 3000], ids=["near", "far"])
+@pytest.mark.parametrize("second", ["t2,x,y,z", "t2,x"])
+def test_a_second_table_in_a_file_is_refused(read, table, rows, second):
+    first = joined(table * (rows // 100))
+    below = [row.split(",")[: second.count(",") + 1] for row in joined(table)]
+    with pytest.raises(InputError, match="save each as a file of its own"):
+        read([",".join(NAMES), *first, "", second, *joined(below)])
+
+
+def test_words_in_place_of_a_row_are_no_second_table(read, table):
+    rows = joined(table)
+    _, columns = read([",".join(NAMES), *rows[:50], "motor stopped, by hand", *rows[50:]])
+    kept = {name: values[np.isfinite(columns["time"])] for name, values in columns.items()}
+    assert_same(kept, table)
+
+
+def test_pairs_of_x_and_y_have_the_names_above_them_and_clocks_of_their_own(read, table):
+    pairs = [[row[0], row[1], row[0], row[3]] for row in table]
+    source, columns = read(["Position,,Current mA,", "X,Y,X,Y", *joined(pairs)])
+    assert_allclose(columns["Position [Y]"], np.array(table, dtype=float)[:, 1])
+    assert source.clocks == {
+        "Position [Y]": "Position [X]",
+        "Current mA [Y]": "Current mA [X]",
+    }
+
+
+def test_names_in_two_lines_are_put_together(read, table):
+    _, columns = read(["clock,hip,knee,knee", "t,pos,pos,tau", "s,rad,rad,Nm", *joined(table)])
+    names = ["clock [t] [s]", "hip pos [rad]", "knee pos [rad]", "knee tau [Nm]"]
+    assert_same(columns, table, names)
+
+
+def test_an_export_of_twincat_scope_names_its_columns_and_clocks(read, table):
+    """Facts about each channel, whose key stands at every clock; a clock may serve several."""
+    facts = {"Name": NAMES[1:], "SampleTime[ms]": "1" * 3, "Unit": ("rad", "(None)", "Nm")}
+    rows = [[row[0], row[1], row[2], row[0], row[3]] for row in table]
+    lines = [
+        "Name\tleg",
+        "File\tC:\\leg.csv",
+        "",
+        *("\t".join([key, of[0], of[1], key, of[2]]) for key, of in facts.items()),
+        "",
+        *joined(rows, "\t", decimal=","),
+        "EOF",
+    ]
+    source, columns = read(lines)
+    assert_allclose(columns["torque"][:-1], np.array(table, dtype=float)[:, 3])
+    clock, other = "time of angle [ms]", "time of torque [ms]"
+    assert source.clocks == {"angle": clock, "velocity": clock, "torque": other}
+    assert source.units == {"angle": "rad", "torque": "Nm"}
+
+
+def test_labview_lvm_is_read_with_each_channels_clock(read, table):
+    lines = [
+        "LabVIEW Measurement\t",
+        "Separator\tTab",
+        "***End_of_Header***\t",
+        "",
+        "Channels\t2\t\t\t",
+        "Samples\t100\t\t100\t",
+        "Y_Unit_Label\trad\t\tNm\t",
+        "Delta_X\t0.01\t\t0.01\t",
+        "***End_of_Header***\t\t\t\t",
+        "X_Value\tangle\tX_Value\ttorque\tComment",
+        *joined([[row[0], row[1], row[0], row[3]] for row in table], "\t"),
+    ]
+    source, columns = read(lines, "log.lvm")
+    assert_allclose(columns["torque"], np.array(table, dtype=float)[:, 3])
+    assert source.clocks["torque"] == "X_Value#2"
+
+
+def test_a_json_log_whose_last_line_is_cut_loses_that_line(read):
+    lines = [f'{{"t": {k}, "q": {k * k}}}' for k in range(20)]
+    source, columns = read([*lines, '{"t": 20, "q"'], "log.json")
+    assert_allclose(columns["q"], np.arange(20) ** 2)
+    assert "is cut; left out" in source.remarks[0]
+
+
+def two(values):
+    return np.vstack([values, 0.5 * values])
+
+
+def test_time_lies_along_the_axis_that_is_as_long_as_the_clock(imported, pendulum, tmp_path):
+    """The same of MATLAB, NumPy, JSON and HDF5, which share how arrays become columns."""
+    log = {
+        "time": pendulum.time[np.newaxis],
+        "q": np.vstack([pendulum.angle, pendulum.velocity]),
+        "tau": two(pendulum.torque)[:, np.newaxis],
+    }
+    scipy.io.savemat(tmp_path / "log.mat", {"run": log})
+    text = MAP.replace('"time"', '"run.time"').replace('"angle"', '"run.q[0]"')
+    text = text.replace('"velocity"', '"run.q[1]"').replace('"torque"', '"run.tau[0]"')
+    frame = imported(tmp_path / "log.mat", map_text=text).recording().frame
+    assert_allclose(frame["pivot_torque_nm"], pendulum.torque)
+    np.savez(tmp_path / "log.npz", **log)
+    source = open_source(tmp_path / "log.npz", SourceSettings())
+    assert source.names == ("time", "q[0]", "q[1]", "tau[0]", "tau[1]")
+    assert_allclose(source.load(["tau[1]"])["tau[1]"], 0.5 * pendulum.torque)
+
+
+def test_channels_in_rows_of_hdf5_are_columns(pendulum, tmp_path):
+    h5py = pytest.importorskip("h5py")
+    with h5py.File(tmp_path / "log.h5", "w") as file:
+        file["leg/time"], file["leg/q"] = pendulum.time, two(pendulum.angle)
+    source = open_source(tmp_path / "log.h5", SourceSettings())
+    assert source.names == ("leg/q[0]", "leg/q[1]", "leg/time")
+    assert_allclose(source.load(["leg/q[1]"])["leg/q[1]"], 0.5 * pendulum.angle)
+
+
+def structs(fields, rows):
+    array = np.zeros((1, len(rows)), dtype=[(field, object) for field in fields])
+    for k, row in enumerate(rows):
+        array[0, k] = row
+    return array
+
+
+def test_an_array_of_structs_is_signals_by_their_names(pendulum, tmp_path):
+    """As Simulink's Structure With Time, dSPACE's ControlDesk, and a Dataset saved as a struct."""
+    time, signals = (
+        pendulum.time[:, np.newaxis],
+        [("angle", pendulum.angle), ("tau", pendulum.torque)],
+    )
+    columns = {name: values[:, np.newaxis] for name, values in signals}
+    rows = [(values, 1.0, name) for name, values in columns.items()]
+    elements = [
+        (name, {"Time": time, "Data": values.reshape(1, 1, -1)}) for name, values in columns.items()
+    ]
+    log = {
+        "out": {"time": time, "signals": structs(["values", "dimensions", "label"], rows)},
+        "exp": {"Y": structs(["Name", "Data"], [(name, v.T) for name, v in columns.items()])},
+        "logsout": {"Elements": structs(["Name", "Values"], elements)},
+    }
+    scipy.io.savemat(tmp_path / "log.mat", log)
+    source = open_source(tmp_path / "log.mat", SourceSettings())
+    names = ["out.signals.tau", "exp.Y.tau", "logsout.Elements.tau.Values.Data"]
+    for name in names:
+        assert_allclose(source.load([name])[name], pendulum.torque)
+    assert source.clocks[names[2]] == "logsout.Elements.tau.Values.Time"
