@@ -12,7 +12,7 @@ from typing import get_origin
 from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
-from pipelines.settings.base import models_in
+from pipelines.settings.base import Settings, models_in
 from pipelines.settings.experiment import Experiment
 from pipelines.settings.import_map import ImportMap
 from pipelines.settings.rig import RigSettings
@@ -89,6 +89,7 @@ def grouped_sections(model: type[BaseModel]) -> Iterator[str]:
     # Most headings of a section's title; more stand below it.
     most = 6
     headings: dict[type[BaseModel], dict[str, None]] = {}
+    bases: dict[type, str] = {}
     for heading, inner in sections_of(model):
         headings.setdefault(inner, {})[f"`{heading}`"] = None
     for inner, names in headings.items():
@@ -96,6 +97,16 @@ def grouped_sections(model: type[BaseModel]) -> Iterator[str]:
         if not rows:
             continue
         title, about = ", ".join(names), inner.__doc__ or ""
+        base = inner.__bases__[0]
+        # Keys that two kinds of table inherit are listed once.
+        if base in bases:
+            shared = list(rows_of(base))
+            rows = [row for row in rows if row not in shared]
+            about += (
+                f"\n\nIt also has the keys of {bases[base]} down to `{[*base.model_fields][-1]}`."
+            )
+        elif base is not Settings:
+            bases[base] = next(iter(names))
         if len(names) > most:
             title, about = inner.__name__, f"{about}\n\nTables: {title}."
         yield f"## {title}\n\n{about}\n\n{HEAD}" + "\n".join(rows)

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from pipelines.errors import InputError, SettingsError
 from pipelines.importing.finding import Finding, counted, noting
 from pipelines.importing.quantities.conversion import columns_of, quantity
-from pipelines.importing.quantities.numbers import TAKEN_FOR_MISSING, numbers
+from pipelines.importing.quantities.numbers import TAKEN_FOR_MISSING, numbers, same_stamps
 from pipelines.importing.sources.source import Columns, Source
 from pipelines.importing.time import clock
 from pipelines.importing.time.clock import Run
@@ -203,7 +203,7 @@ def read_log(source: Source, settings: ImportMap, map_path: Path) -> Log:
     column = settings.time.column
     clocks = {channel.time for channel in channels} | {column}
     # A clock that is the same as that of the log is none of the channel's own.
-    same = {name for name in clocks if name and np.array_equal(columns[name], columns[column])}
+    same = {name for name in clocks if name and same_stamps(columns[name], columns[column])}
     channels = tuple(replace(one, time=None) if one.time in same else one for one in channels)
     _check_switches(channels, source, {column, *same})
     columns = _as_numbers(columns, clocks, findings)

@@ -14,7 +14,7 @@ def is_continuous(values: NDArray) -> bool:
         return True
     steps = np.abs(np.diff(known))
     far = steps > 0.5 * np.ptp(known)
-    # Where every step is far, rows are too rare to tell.
+    # Where every step is far, rows are too rare to show a motion.
     if far.any() and not far.all() and np.max(steps[~far]) < 0.25 * np.ptp(known):
         return False
     # White noise has 1.7; rows some way apart, as neighbours may differ by an encoder's step.

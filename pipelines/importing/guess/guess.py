@@ -21,7 +21,7 @@ from pipelines.importing.guess.names import Meaning, meaning
 from pipelines.importing.guess.parts import Join, opened, runs_to_join
 from pipelines.importing.guess.proposal import Proposal
 from pipelines.importing.guess.time import TimeGuess, guess_time, runs_of, write_time
-from pipelines.importing.quantities.numbers import numbers, whole_nanoseconds
+from pipelines.importing.quantities.numbers import numbers, same_stamps, whole_nanoseconds
 from pipelines.importing.quantities.wraparound import fill_value
 from pipelines.importing.sources.source import Columns, Source
 from pipelines.importing.time import clock
@@ -47,7 +47,9 @@ def propose(paths: Sequence[Path]) -> Proposal:
         source = opened(paths[0], join)
         columns, typed = _typed_columns(source)
         names = _meanings(source)
-        time = guess_time(_clock_first(names, source), columns, typed)
+        # A slower channel of a table ends before the others, in rows without a stamp.
+        ended = {name: _without_blanks(columns[name]) for name in source.clocks.values()}
+        time = guess_time(_clock_first(names, source), columns | ended, typed)
         if time is None:
             raise InputError(_no_clock(names, columns))
     for path in paths[1:]:
@@ -129,6 +131,10 @@ def _clock_first(names: Sequence[Meaning], source: Source) -> list[Meaning]:
     return [m for m in names if m.column == clock_name]
 
 
+def _without_blanks(values: NDArray) -> NDArray:
+    return values[np.isfinite(values)] if values.dtype.kind == "f" else values
+
+
 def _onto_one_clock(source: Source, column: str, columns: Columns) -> dict[str, str]:
     """Interpolate columns with a clock of their own, and return that clock by column."""
     stamps = columns[column].astype(float)
@@ -138,7 +144,7 @@ def _onto_one_clock(source: Source, column: str, columns: Columns) -> dict[str, 
             continue
         at, values = columns[clock_name], columns[name]
         numeric = {at.dtype.kind, values.dtype.kind} <= set("biuf")
-        if clock_name == column or not numeric or np.array_equal(at, columns[column]):
+        if clock_name == column or not numeric or same_stamps(at, columns[column]):
             continue
         known = np.isfinite(at) & np.isfinite(values)
         if known.any() and np.all(np.diff(at[known]) > 0):

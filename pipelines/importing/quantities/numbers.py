@@ -88,6 +88,18 @@ def _have_thousands(texts: pd.Series, decimal: str) -> bool:
     )
 
 
+def same_stamps(one: NDArray, other: NDArray) -> bool:
+    """Return whether two clocks (n,) have equal stamps, where text counts as missing."""
+    if pd.Series(one).equals(pd.Series(other)):
+        return True
+    if len(one) != len(other) or "M" in one.dtype.kind + other.dtype.kind:
+        return False
+    numeric = numbers(one)
+    return bool(np.isfinite(numeric).any()) and np.array_equal(
+        numeric, numbers(other), equal_nan=True
+    )
+
+
 def whole_nanoseconds(values: NDArray) -> NDArray:
     """Return dates such as ``2026-01-31 12:00:00.125`` as nanoseconds since 1970.
 

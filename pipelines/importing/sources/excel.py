@@ -43,18 +43,18 @@ def open_excel(path: Path, settings: SourceSettings) -> Source:
     except Exception as error:  # the library raises errors of any class for a damaged file
         raise InputError(f"is a damaged workbook ({error}); save it again") from error
     as_text = settings.model_copy(update={"delimiter": "\t", "encoding": "utf-8"})
-    found: dict[str, Source] = {}
+    tables: dict[str, Source] = {}
     problem = InputError("has no sheet of cells; save the table again")
     for title, text in texts.items():
         try:
-            found[title] = open_lines(path, "Excel", text, as_text)
+            tables[title] = open_lines(path, "Excel", text, as_text)
         except InputError as error:
             problem = error
-    if len(found) > 1:
-        raise InputError(f"has tables in {', '.join(found)}; name one in the map: source.table")
-    if not found:
+    if len(tables) > 1:
+        raise InputError(f"has tables in {', '.join(tables)}; name one in the map: source.table")
+    if not tables:
         raise problem
-    return next(iter(found.values()))
+    return next(iter(tables.values()))
 
 
 def _text(rows: Iterable[tuple[Any, ...]]) -> str:

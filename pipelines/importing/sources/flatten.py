@@ -20,7 +20,7 @@ def nested_source(
 ) -> Source:
     """Return a log of the arrays in nested content.
 
-    Time runs along the axis that is as long as a vector in the content, or else the longest.
+    Time runs along the axis that is as long as a vector (n,) in the content, or else the longest.
     """
     lengths = vector_lengths(array.shape for array in leaves.values())
     columns = {
@@ -33,7 +33,7 @@ def nested_source(
 
 
 def clocks_of(columns: Mapping[str, np.ndarray], separator: str = ".") -> dict[str, str]:
-    """Return the clock in the same table as each column, where several tables have one."""
+    """Return the clock (n,) in the same table as each column, where several tables have one."""
     words = ("time", "t", "timestamp", "timestamps")
     clocks = {
         name.rpartition(separator)[0]: name
@@ -49,7 +49,7 @@ def clocks_of(columns: Mapping[str, np.ndarray], separator: str = ".") -> dict[s
 
 
 def leaves_of(content: Any, name: str = "") -> Leaves:
-    """Return every array of numbers or text in nested content; other values are left out."""
+    """Return every array (n, ...) of numbers or text in nested content; others are left out."""
     return dict(_leaves(content, name))
 
 

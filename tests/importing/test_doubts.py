@@ -1,0 +1,181 @@
+"""A guess is sure only where a wrong alternative was tried and lost."""
+
+import tomllib
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from exoid_cli.app import run
+from pipelines.importing.guess.torque import fit_torque
+from pipelines.importing.quantities.wraparound import fill_value, full_at, sign_bit
+from tests.importing.test_guess import guessed
+
+__all__ = ["guessed"]
+
+
+def counts_of(pendulum):
+    """The pendulum's angle in the counts of an encoder of 12 bits."""
+    return np.round(pendulum.angle * 4096 / (2.0 * np.pi)).astype(int)
+
+
+def with_bit(counts, bit):
+    return np.where(counts < 0, -counts | 1 << bit, counts)
+
+
+def test_joints_with_names_of_rotations_have_their_own_moments(guessed, pendulum, write_csv):
+    """Names as OpenSim writes them."""
+    columns = {
+        "time": pendulum.time,
+        "hip_flexion_r": 50.0 * pendulum.angle,
+        "knee_angle_r": 50.0 * np.roll(pendulum.angle, 200),
+        "hip_flexion_r_moment": pendulum.torque,
+        "knee_angle_r_moment": np.roll(pendulum.torque, 200),
+    }
+    text, _ = guessed(write_csv(columns))
+    joints = [(j["angle"]["column"], j["torque"]["column"]) for j in tomllib.loads(text)["joint"]]
+    assert joints == [
+        ("hip_flexion_r", "hip_flexion_r_moment"),
+        ("knee_angle_r", "knee_angle_r_moment"),
+    ]
+
+
+def test_a_moment_of_another_joint_than_the_angle_is_unsure(guessed, pendulum, write_csv):
+    columns = {"time": pendulum.time, "knee_angle": pendulum.angle, "hip_moment": pendulum.torque}
+    _, doubts = guessed(write_csv(columns))
+    assert doubts["joint[0].torque.column"].startswith("its name says hip, the angle's knee")
+
+
+def test_one_of_several_columns_that_names_do_not_tell_apart_is_unsure(
+    guessed, pendulum, write_csv
+):
+    columns = {"time": pendulum.time, "motor angle": pendulum.angle, "angle": 2.0 * pendulum.angle}
+    _, doubts = guessed(write_csv(columns | {"torque": pendulum.torque}))
+    assert doubts["joint[0].angle.column"] == "no name shows which, rather than angle"
+
+
+def test_a_measured_current_goes_before_a_commanded_torque(guessed, pendulum, write_csv):
+    columns = {
+        "time": pendulum.time,
+        "angle": pendulum.angle,
+        "target_torque": pendulum.torque,
+        "motor_current_A": 2.0 * pendulum.torque,
+    }
+    text, _ = guessed(write_csv(columns))
+    assert tomllib.loads(text)["joint"][0]["torque"]["column"] == "motor_current_A"
+
+
+def test_joints_that_rest_while_another_moves_are_left_out_and_said(guessed, pendulum, write_csv):
+    noise = 1e-4 * np.random.default_rng(1).normal(size=len(pendulum.time))
+    columns = {
+        "time": pendulum.time,
+        "hip_angle": noise,
+        "hip_torque": 3.0 + noise,
+        "knee_angle": pendulum.angle,
+        "knee_torque": pendulum.torque,
+    }
+    text, doubts = guessed(write_csv(columns))
+    assert [joint["name"] for joint in tomllib.loads(text)["joint"]] == ["knee"]
+    assert doubts["joint"].startswith("hip rest while others move, and are left out")
+
+
+def test_a_register_of_magnitude_and_sign_is_proposed_and_imports_the_truth(
+    imported, guessed, pendulum, write_csv
+):
+    counts = counts_of(pendulum)
+    columns = {
+        "time": pendulum.time,
+        "position": with_bit(counts, 15),
+        "torque": with_bit(np.round(100.0 * pendulum.torque).astype(int), 10),
+    }
+    path = write_csv(columns)
+    text, doubts = guessed(path)
+    assert "wraps_at" not in text
+    assert {"joint[0].angle.sign_bit", "joint[0].torque.sign_bit"} <= doubts.keys()
+    text = text.replace("# counts_per_turn = ", "counts_per_turn = 4096 ")
+    frame = imported(path, map_text=text).recording("log_train").frame
+    assert_allclose(frame["joint_angle_rad"], counts[: len(frame)] * 2.0 * np.pi / 4096)
+
+
+def test_an_import_without_the_sign_bit_says_that_there_is_one(imported, pendulum, write_csv):
+    columns = pendulum.columns() | {
+        "torque": with_bit(np.round(100 * pendulum.torque).astype(int), 10)
+    }
+    outcome = imported(write_csv(columns))
+    assert "kept; set sign_bit = 10 if that is so" in outcome.printed
+
+
+def test_a_counter_never_reads_more_than_its_modulus(pendulum):
+    counts = counts_of(pendulum)
+    assert full_at(counts % 4096.0, ()) == 4096.0
+    assert full_at(with_bit(counts, 15).astype(float), ()) is None
+    assert sign_bit(with_bit(counts, 15)) == 15
+    # Two's complement has readings up to the last.
+    assert sign_bit(counts % 65536) is None
+
+
+@pytest.mark.parametrize(
+    "encode",
+    [
+        lambda counts: (counts + 2048) ^ ((counts + 2048) >> 1),
+        lambda counts: np.array([int(str(count + 2048), 16) for count in counts]),
+        lambda counts: counts.astype(np.float32).view(np.uint32).astype(np.int64),
+    ],
+    ids=["Gray", "BCD", "bits of float32"],
+)
+def test_an_encoding_that_is_not_known_is_unsure(guessed, pendulum, write_csv, encode):
+    columns = {"time": pendulum.time, "position": encode(counts_of(pendulum))}
+    text, doubts = guessed(write_csv(columns | {"torque_Nm": pendulum.torque}))
+    assert "jumps from row to row" in doubts["joint[0].angle.unit"]
+    assert "signed_bits" not in text or "joint[0].angle.signed_bits" in doubts
+
+
+def test_whole_numbers_may_be_hundredths_of_a_degree(guessed, pendulum, write_csv):
+    columns = {"time": pendulum.time, "position": np.round(np.degrees(pendulum.angle) * 100.0)}
+    _, doubts = guessed(write_csv(columns | {"torque": pendulum.torque}))
+    assert "parts of a degree" in doubts["joint[0].angle.unit"]
+
+
+def test_units_that_only_agree_with_each_other_are_both_unsure(guessed, pendulum, write_csv):
+    """Degrees and degrees per second agree as radians do, on a swing of one degree."""
+    columns = pendulum.columns() | {"angle": pendulum.angle, "velocity": pendulum.velocity}
+    _, doubts = guessed(write_csv(columns))
+    assert {"joint[0].angle.unit", "joint[0].velocity.unit"} <= doubts.keys()
+
+
+def test_a_single_sine_explains_any_torque_of_its_period_and_shows_no_sign(pendulum):
+    angle = np.sin(4.0 * pendulum.time)
+    unrelated = np.sin(4.0 * pendulum.time - 1.0)
+    fit = fit_torque(pendulum.time, angle, unrelated)
+    assert fit.explained > 0.8 and fit.rival > 0.8 and not fit.proves
+    assert fit_torque(pendulum.time, pendulum.angle, pendulum.torque).proves
+
+
+def test_a_value_for_missing_readings_gets_a_range(imported, guessed, pendulum, write_csv):
+    torque = pendulum.torque.copy()
+    torque[::10] = -999.0
+    path = write_csv(pendulum.columns() | {"torque": torque})
+    assert "is exactly -999 in 200 rows" in imported(path).printed
+    text, doubts = guessed(path)
+    low, high = tomllib.loads(text)["joint"][0]["torque"]["range"]
+    assert -3.0 < low < high < 3.0 and "joint[0].torque.range" in doubts
+
+
+def test_a_reading_at_the_end_of_its_range_stands_for_no_missing_one(pendulum):
+    assert fill_value(np.clip(pendulum.torque, -1.0, 1.0)) is None
+    assert fill_value(np.where(pendulum.time > 9.0, 1e30, pendulum.torque)) == 1e30
+
+
+def test_channels_with_clocks_of_their_own_are_guessed_with_them(pendulum, tmp_path, capsys):
+    """An oscilloscope's pairs, of which the torque has half the rate."""
+    half = [*pendulum.time[::2], *[np.nan] * (len(pendulum.time) // 2)]
+    torque = [*pendulum.torque[::2], *[np.nan] * (len(pendulum.time) // 2)]
+    rows = zip(pendulum.time, pendulum.angle, half, torque, strict=True)
+    lines = ["Angle [rad],,Torque [Nm],", "X,Y,X,Y", *(",".join(map(str, row)) for row in rows)]
+    path = tmp_path / "log.csv"
+    path.write_text("\n".join(lines).replace("nan", ""))
+    assert run(["import", str(path), "--guess"]) == 0
+    proposed = tomllib.loads(capsys.readouterr().out)
+    assert proposed["time"]["column"] == "Torque [Nm] [X]"
+    assert proposed["joint"][0]["angle"]["time"] == "Angle [rad] [X]"
+    assert proposed["joint"][0]["angle"]["unit"] == "rad"
