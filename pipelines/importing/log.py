@@ -204,7 +204,11 @@ def read_log(source: Source, settings: ImportMap, map_path: Path) -> Log:
     clocks = {channel.time for channel in channels} | {column}
     # A clock that is the same as that of the log is none of the channel's own.
     same = {name for name in clocks if name and same_stamps(columns[name], columns[column])}
-    channels = tuple(replace(one, time=None) if one.time in same else one for one in channels)
+    # The map may name the clock of the log, to interpolate a channel of which rows are blank.
+    channels = tuple(
+        replace(one, time=None) if one.reading.time is None and one.time in same else one
+        for one in channels
+    )
     _check_switches(channels, source, {column, *same})
     columns = _as_numbers(columns, clocks, findings)
     stamps = clock.stamps(columns[column], column, settings.time, note)

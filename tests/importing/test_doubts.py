@@ -179,3 +179,23 @@ def test_channels_with_clocks_of_their_own_are_guessed_with_them(pendulum, tmp_p
     assert proposed["time"]["column"] == "Torque [Nm] [X]"
     assert proposed["joint"][0]["angle"]["time"] == "Angle [rad] [X]"
     assert proposed["joint"][0]["angle"]["unit"] == "rad"
+
+
+def test_an_angle_that_is_blank_where_the_torque_is_logged_is_interpolated(
+    imported, guessed, pendulum, write_csv
+):
+    """Two rates in one table, whose rows have the one or the other."""
+    even = np.arange(len(pendulum.time)) % 2 == 0
+    columns = {
+        "time_s": pendulum.time,
+        "angle_rad": np.where(even, pendulum.angle, np.nan),
+        "torque_Nm": np.where(even, np.nan, pendulum.torque),
+    }
+    path = write_csv(columns)
+    path.write_text(path.read_text().replace("nan", ""))
+    text, _ = guessed(path)
+    assert tomllib.loads(text)["joint"][0]["angle"]["time"] == "time_s"
+    frame = imported(path, map_text=text).recording("log_train").frame
+    rows = np.round(frame["time_s"] * 200.0).astype(int)
+    assert len(frame) > 650
+    assert_allclose(frame["joint_angle_rad"], pendulum.angle[rows], atol=1e-3)

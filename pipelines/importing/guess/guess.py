@@ -55,6 +55,7 @@ def propose(paths: Sequence[Path]) -> Proposal:
     for path in paths[1:]:
         _check_columns(path, source, join)
     clocks = _onto_one_clock(source, time.column, columns)
+    clocks |= _into_blank_rows(names, time.column, columns)
     columns[time.column] = time.stamps(columns[time.column])
     # Within one run, because integrals and fits across a restart of the clock mean nothing.
     run = max(runs_of(columns[time.column], time.unit), key=len)
@@ -129,6 +130,22 @@ def _clock_first(names: Sequence[Meaning], source: Source) -> list[Meaning]:
         return list(names)
     clock_name = source.clocks[(of_drive or of_others)[0]]
     return [m for m in names if m.column == clock_name]
+
+
+def _into_blank_rows(names: Sequence[Meaning], column: str, columns: Columns) -> dict[str, str]:
+    """Interpolate columns that are blank in the rows of the torque; return their clock."""
+    drive = next((m for m in names if m.quantity in TURNING), None)
+    if drive is None or columns[drive.column].dtype.kind != "f":
+        return {}
+    stamps, rows = columns[column].astype(float), np.isfinite(columns[drive.column])
+    blank: dict[str, str] = {}
+    for name in (m.column for m in names if m.quantity in ("velocity", *MOTION)):
+        values = columns[name]
+        known = np.isfinite(values) if values.dtype.kind == "f" else np.array([])
+        if known.shape == rows.shape and known.any() and np.mean(known[rows]) < 0.5:
+            inside = np.interp(stamps, stamps[known], values[known], left=np.nan, right=np.nan)
+            columns[name], blank[name] = inside, column
+    return blank
 
 
 def _without_blanks(values: NDArray) -> NDArray:

@@ -139,7 +139,7 @@ def _encoding(start: bytes) -> str:
     if nuls and not _is_stray(nuls, start):
         raise InputError(
             f"is in no known format (it starts with {start[:8]!r}); export it as text, .mat,"
-            " Parquet, JSON, HDF5, MCAP or ROS 2 bag"
+            " Parquet, JSON, HDF5, .xlsx or .tdms"
         )
     try:
         # Incremental, as the last character may be cut in two.

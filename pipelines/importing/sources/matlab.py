@@ -33,7 +33,12 @@ def open_matlab(path: Path, settings: SourceSettings) -> Source:
             f"is a damaged .mat file ({type(error).__name__}: {error}); save it again"
         ) from error
     # Names with two underscores are scipy's own: header, version, globals.
-    variables = {name: value for name, value in content.items() if not name.startswith("__")}
+    variables = {
+        name: value
+        for name, value in content.items()
+        # Objects such as a timeseries are stored in a form that only MATLAB can read.
+        if not name.startswith("__") and not isinstance(value, scipy.io.matlab.MatlabOpaque)
+    }
     if settings.table is not None:
         if settings.table not in variables:
             raise InputError(
