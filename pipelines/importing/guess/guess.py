@@ -154,8 +154,10 @@ def _without_blanks(values: NDArray) -> NDArray:
 
 def _onto_one_clock(source: Source, column: str, columns: Columns) -> dict[str, str]:
     """Interpolate columns with a clock of their own, and return that clock by column."""
-    stamps = columns[column].astype(float)
     own: dict[str, str] = {}
+    if columns[column].dtype.kind not in "iuf":
+        return own
+    stamps = columns[column].astype(float)
     for name, clock_name in source.clocks.items():
         if name not in columns:
             continue

@@ -103,7 +103,7 @@ def sign_bit(values: NDArray) -> int | None:
 def fill_value(values: NDArray) -> float | None:
     """Return a value that stands for missing readings, such as -999 or 1e30; None without one.
 
-    It is the lowest or highest reading, the same in all its rows, fewer than half of them, and
+    It is the lowest or highest reading, the same in several rows, fewer than half of them, and
     farther from all others than these are from each other.
 
     Parameters
@@ -114,7 +114,8 @@ def fill_value(values: NDArray) -> float | None:
     known = values[np.isfinite(values)]
     for value in (np.min(known), np.max(known)) if len(known) else ():
         others = known[known != value]
-        if len(others) <= len(known) / 2 or np.ptp(others) == 0.0:
+        single = len(others) == len(known) - 1
+        if single or len(others) <= len(known) / 2 or np.ptp(others) == 0.0:
             continue
         if np.min(np.abs(others - value)) > np.ptp(others):
             return float(value)
