@@ -1,12 +1,11 @@
 """A file's values as numbers; text that is no number is reported, and counts as missing."""
 
-import re
-
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
 from pipelines.importing.finding import Note, counted, unnoted
+from pipelines.importing.sources.decimal_marks import have_thousands
 
 TAKEN_FOR_MISSING = "taken for missing"
 """Treatment of a text where a number should be."""
@@ -34,7 +33,7 @@ def numbers(values: NDArray, note: Note = unnoted) -> NDArray:
     # As text, because pandas would convert dates to nanoseconds. A date in a column for an angle is
     # no number.
     text = pd.Series(values.astype(str).astype(object) if values.dtype.kind in "mM" else values)
-    if _have_thousands(text, "."):
+    if have_thousands(text, "."):
         note("commas between thousands", "read without them")
         text = text.map(lambda one: one.replace(",", "") if isinstance(one, str) else one)
     result = pd.to_numeric(text, errors="coerce").to_numpy(dtype=float, na_value=np.nan)
@@ -47,45 +46,6 @@ def numbers(values: NDArray, note: Note = unnoted) -> NDArray:
         )
         note(seen, TAKEN_FOR_MISSING)
     return result
-
-
-def as_written(column: pd.Series, decimal: str) -> pd.Series:
-    """Return a column of a text file whose numbers have a decimal point.
-
-    Text stays text. pandas leaves a whole column as it is written if one of its cells is no number.
-
-    Parameters
-    ----------
-    column : (n,) Series
-        Numbers, or text.
-    decimal : str
-        Decimal point of the file.
-    """
-    if decimal == "." or column.dtype.kind in "biuf":
-        return column
-    texts = column.astype(object)
-    if _have_thousands(texts, ","):
-        texts = texts.str.replace(r"\.(?=\d{3})", "", regex=True)
-    comma = r"^(\s*[-+]?\d*),(\d*(?:[eE][-+]?\d+)?\s*)$"
-    return texts.str.replace(comma, r"\1.\2", regex=True)
-
-
-def _have_thousands(texts: pd.Series, decimal: str) -> bool:
-    """Return whether numbers have marks between their thousands: commas, or points.
-
-    All numbers with such a mark must be of this kind, and one of them must have a decimal point.
-    Without it the mark may be a decimal one.
-    """
-    mark = "," if decimal == "." else "."
-    digits = r"[-+\d.,]+"
-    thousands = rf"[+-]?[1-9]\d{{0,2}}(?:{re.escape(mark)}\d{{3}})+(?:{re.escape(decimal)}\d+)?"
-    marked = pd.Series(
-        [text for text in texts if isinstance(text, str) and mark in text], dtype=str
-    )
-    marked = marked[marked.str.fullmatch(digits)]
-    return bool(marked.str.contains(decimal, regex=False).any()) and bool(
-        marked.str.fullmatch(thousands).all()
-    )
 
 
 def same_stamps(one: NDArray, other: NDArray) -> bool:
