@@ -4,8 +4,8 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from pipelines.importing.decimal_marks import have_thousands
 from pipelines.importing.finding import Note, counted, unnoted
-from pipelines.importing.sources.decimal_marks import have_thousands
 
 TAKEN_FOR_MISSING = "taken for missing"
 """Treatment of a text where a number should be."""

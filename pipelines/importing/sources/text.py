@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 
 from pipelines.errors import InputError
-from pipelines.importing.sources.decimal_marks import as_written
+from pipelines.importing.decimal_marks import as_written
 from pipelines.importing.sources.dialect import Dialect, find_dialect
 from pipelines.importing.sources.source import Columns, Source
 from pipelines.settings.import_map import SourceSettings
