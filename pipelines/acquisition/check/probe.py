@@ -12,7 +12,6 @@ from pipelines.acquisition.machine.force_sensor import Sensor
 from pipelines.acquisition.modbus.wraparound import Unwrapper
 from pipelines.modbus.register_block import Block
 from pipelines.settings.rig import Register
-from pipelines.settings.rig.block import registers_of
 
 
 @dataclass(frozen=True)
@@ -85,7 +84,7 @@ class Probe:
         self.part = part
         self.is_drive = isinstance(part, Drive)
         self.in_lockstep = in_lockstep
-        self.block = Block(registers_of(part.map.read))
+        self.block = part.reader.block
         kind, place = (
             ("drive", part.settings.joint)
             if isinstance(part, Drive)
@@ -110,7 +109,7 @@ class Probe:
     async def read(self) -> None:
         """Read the block and keep the answer."""
         asked = time.perf_counter()
-        self._keep(asked, await self.part.device.read(self.block.address, self.block.count))
+        self._keep(asked, await self.part.reader.read())
 
     async def step(self) -> None:
         """Advance a disabled drive in lockstep to its next sample; read any other device."""
@@ -127,7 +126,9 @@ class Probe:
     async def count(self) -> None:
         """Read the sample counter alone, as a run does before each sample."""
         counter = self.block.registers["sequence"]
-        await self.part.device.read(counter.address, counter.registers)
+        await self.part.device.read(
+            counter.address, counter.registers, function=self.part.reader.function
+        )
 
     def last(self) -> dict[str, float]:
         """Return the last answer's values, SI units."""

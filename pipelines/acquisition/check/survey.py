@@ -137,9 +137,11 @@ async def _measure_device(probe: Probe, report: DeviceReport) -> None:
     device, loop = probe.part.device, asyncio.get_running_loop()
     report.connected = True
     for entry in probe.part.map.identity:
-        (value,) = await device.read(entry.address, 1)
+        (value,) = await device.read(
+            entry.address, 1, function=entry.function or probe.part.reader.function
+        )
         report.identity.append({"address": entry.address, "expected": entry.value, "found": value})
-    await device.check_identity(probe.part.map.identity)
+    await device.check_identity(probe.part.map.identity, probe.part.reader.function)
     until = loop.time() + reads_s
     for k in range(reads):
         if k and loop.time() > until:

@@ -57,7 +57,7 @@ class Machine:
         """Open every line and check the identity of every device."""
         for part in self._parts:
             await part.device.line.connect()
-            await part.device.check_identity(part.map.identity)
+            await part.device.check_identity(part.map.identity, part.reader.function)
 
     async def refuse_driven(self) -> None:
         """Refuse to write to a rig that another program drives.

@@ -11,6 +11,8 @@ from pymodbus.exceptions import ConnectionException, ModbusException
 from pymodbus.pdu import ModbusPDU
 
 from pipelines.acquisition.modbus.connection import client_of, explain, tls_context
+from pipelines.acquisition.modbus.framing import Ear
+from pipelines.acquisition.modbus.heard import as_hex
 from pipelines.acquisition.modbus.reply import InvalidReply, check_replies
 from pipelines.errors import DeviceError
 from pipelines.settings.rig import RigSettings
@@ -49,7 +51,8 @@ class Line:
         self.client = client_of(settings, self._tls, timeout_s, self._note_connection)
         # Else pymodbus closes the connection after some missing replies; the watchdog decides that.
         self.client.set_max_no_responses(sys.maxsize)
-        check_replies(self.client, self._note_reply)
+        self.ear = Ear()
+        check_replies(self.client, not settings.has_transaction_ids, self.ear, self._note_reply)
         self.devices: list[str] = []
         """Names of the devices on it."""
         self._settings, self._timeout_s, self._name = settings, timeout_s, name
@@ -60,6 +63,10 @@ class Line:
         """Whether it has sent a request in its turn."""
         self._asking = self._failed = self._has_answered = False
         """Whether a request is under way, the last one was not answered, any ever was answered."""
+        self._answers = 0
+        """Answers on this connection."""
+        self._closes: bool | None = None
+        """Whether the other end closes a connection after one answer; None until that shows."""
         self._asked: dict[int, float] = {}
         """Event loop's time, s, since when a unit waits for its turn or its reply."""
         self._late: dict[int, LateReply] = {}
@@ -82,10 +89,11 @@ class Line:
         async with self._turn:
             await self._open()
 
-    async def _open(self) -> None:
+    async def _open(self, within_s: float | None = None) -> None:
         if self.client.connected:
             return
-        self.client.ctx.comm_params.timeout_connect = self._timeout_s
+        self._answers = 0
+        self.client.ctx.comm_params.timeout_connect = within_s or self._timeout_s
         try:
             is_open = await self.client.connect()
         except BAD_SETTINGS as error:
@@ -99,6 +107,7 @@ class Line:
 
     def close(self) -> None:
         """Close the connection, if it is open."""
+        self._answers = 0  # so that this end is not taken for the other's
         if self.client.ctx.transport:
             # Without the closing handshake of TLS: the other end may be gone.
             cast(asyncio.Transport, self.client.ctx.transport).abort()
@@ -167,11 +176,18 @@ class Line:
         self._used = True
         self._asked.setdefault(unit, asyncio.get_running_loop().time())
         try:
-            await self._pause()
-            # pymodbus uses this one setting as time-out of connections and replies alike.
-            self.client.ctx.comm_params.timeout_connect = within_s
-            self._asking = self._failed = True
-            answer = await request(**arguments, device_id=unit)
+            try:
+                answer = await self._send(unit, within_s, request, arguments)
+            except (ModbusException, OSError):
+                # The request may have met a connection that ends after its first answer.
+                ended = not self.client.connected and not self.ear.came and self._answers == 1
+                if not ended or self._closes is False:
+                    raise
+                self._closes = True
+                answer = await self._send(unit, within_s, request, arguments)
+            self._answers += 1
+            if self._answers == 2:
+                self._closes = False
             # The reply to another request counts as an answer, but the next try needs a new
             # connection.
             self._failed, self._has_answered = isinstance(answer, InvalidReply), True
@@ -189,6 +205,23 @@ class Line:
                 if unit in self._asked and (len(self.devices) > 1 or not self.has_transaction_ids):
                     self._late[unit] = LateReply(within_s)
             self._asking = False
+
+    async def _send(
+        self,
+        unit: int,
+        within_s: float,
+        request: Callable[..., Awaitable[ModbusPDU]],
+        arguments: dict[str, Any],
+    ) -> ModbusPDU:
+        """Send a request, on a new connection where each takes one only."""
+        if self._closes:
+            self.close()
+            await self._open(within_s)
+        await self._pause()
+        # pymodbus uses this one setting as time-out of connections and replies alike.
+        self.client.ctx.comm_params.timeout_connect = within_s
+        self._asking = self._failed = True
+        return await request(**arguments, device_id=unit)
 
     def awaited_s(self, unit: int) -> float:
         """Return for how long a unit's reply, or its turn, has been awaited, s; 0 for none."""
@@ -231,6 +264,8 @@ class Line:
 
     def _note_connection(self, connected: bool) -> None:
         """End the request that is under way when the connection ends: no reply will come."""
+        if not connected and not self._asking and self._answers == 1 and self._closes is None:
+            self._closes = True
         answer = self.client.ctx.response_future
         if self._asking and not connected and not answer.done():
             answer.set_exception(ConnectionException("lost"))
@@ -244,7 +279,27 @@ class Line:
                 f"the other end closed the line before its first answer{others}; it does not trust"
                 " the certificate and key in the rig file, or has stopped"
             )
-        return f"the line is lost{others}; check cable and power"
+        if self._has_answered or isinstance(self._settings, RtuLine):
+            return f"the line is lost{others}; check cable and power"
+        came = self.ear.came
+        after = f"after {len(came)} bytes ({as_hex(came)})" if came else "without an answer"
+        return (
+            f"the other end closed the line {after}{others}; check transport (TCP or RTU frames),"
+            " port, and that no other program uses it"
+        )
+
+    @property
+    def peculiarities(self) -> list[str]:
+        """What the line does that others do not, in words; it is served all the same."""
+        found = []
+        if self._closes:
+            found.append(
+                f"{self._label}: closes its connection after each answer; each request opens a new"
+                " one, which takes time"
+            )
+        if self.ear.echoes:
+            found.append(f"{self._label}: the adapter sends back each request; that is passed over")
+        return found
 
     async def _refusal(self) -> str:
         """Return why there is no connection, which pymodbus only logs."""

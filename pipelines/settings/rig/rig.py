@@ -113,6 +113,14 @@ class RigSettings(Settings):
             raise ValueError(
                 f"line: two lines lead to {place}; make them one, with all its devices on it"
             )
+        for device in devices:
+            # "Modbus over serial line" V1.02, 2.2: 0 is for all devices at once, 248 to 255 are
+            # reserved.
+            if not self.line_of(device).has_transaction_ids and not 1 <= device.unit <= 247:
+                raise ValueError(
+                    f"unit: found {device.unit} on line {device.line}, expected 1 to 247 in RTU"
+                    " frames; 0 and 248 to 255 are for Modbus TCP alone"
+                )
         for place, unit in repeated((self.line_of(one).place, one.unit) for one in devices):
             raise ValueError(f"unit: two devices have {place} unit {unit}; correct one")
 
@@ -127,6 +135,14 @@ class RigSettings(Settings):
         if self.plant is None and (self.embedded or self.clock == "lockstep"):
             raise ValueError(
                 "plant: missing; a virtual rig (embedded, or in lockstep) needs a [plant]"
+            )
+        own_writes = [
+            drive.map for drive in self.drive if self.map.drive[drive.map].write.function != 23
+        ]
+        if self.clock == "lockstep" and own_writes:
+            raise ValueError(
+                'clock: found "lockstep", in which an FC23 exchange ends a sample, but'
+                f' map.drive.{own_writes[0]}.write.function is not 23; set clock = "real_time"'
             )
         drifts = self.plant is not None and any((*self.plant.clock_ppm, *self.plant.clock_offset_s))
         if self.clock == "lockstep" and (self.clocks == "own" or drifts):
