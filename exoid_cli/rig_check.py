@@ -79,6 +79,8 @@ def check(
     report = check_rig(file, rate_hz, run, OperatorPrompt() if by_hand else None, move=move)
     console.emit(asdict(report))
     _show(report)
+    for note in report.notes:
+        console.note(note)
     if report.findings:
         count = len(report.findings)
         console.say("\nWhat is wrong")

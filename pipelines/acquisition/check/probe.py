@@ -1,7 +1,9 @@
 """One device under check, whose answers are kept as raw words."""
 
 import time
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,9 +11,13 @@ from numpy.typing import NDArray
 from pipelines.acquisition.check.finding import Finding
 from pipelines.acquisition.machine.drive import Drive
 from pipelines.acquisition.machine.force_sensor import Sensor
+from pipelines.acquisition.modbus.blocks import BlockReader
 from pipelines.acquisition.modbus.wraparound import Unwrapper
 from pipelines.modbus.register_block import Block
 from pipelines.settings.rig import Register
+
+Answer = tuple[float, float, list[int]]
+"""When it was asked and answered (host's clock, s), and the words."""
 
 
 @dataclass(frozen=True)
@@ -25,6 +31,37 @@ class Series:
     """(n,) s."""
     words: NDArray
     """(n, registers of the block)."""
+
+    @classmethod
+    async def read(cls, reader: BlockReader, seconds: float) -> Self:
+        """Read a block again and again.
+
+        Parameters
+        ----------
+        reader : BlockReader
+            Of the block.
+        seconds : float
+            For how long.
+
+        Raises
+        ------
+        DeviceError
+            The device did not answer, or refused.
+        """
+        answers: list[Answer] = []
+        until = time.perf_counter() + seconds
+        while not answers or time.perf_counter() < until:
+            asked = time.perf_counter()
+            words = await reader.read()
+            answers.append((asked, time.perf_counter(), words))
+        return cls.of_answers(reader.block, answers)
+
+    @classmethod
+    def of_answers(cls, block: Block, answers: Sequence[Answer]) -> Self:
+        """Return answers as a series."""
+        asked, answered, words = zip(*answers, strict=True) if answers else ((), (), ())
+        shaped = np.array(words, dtype=np.int64).reshape(len(answers), block.count)
+        return cls(block, np.array(asked), np.array(answered), shaped)
 
     def of(
         self,
@@ -95,7 +132,7 @@ class Probe:
         self.map_path = f"map.{kind}.{part.settings.map}"
         self.every = part.settings.every if isinstance(part, Sensor) else 1
         """Cycles of a run from one reading to the next."""
-        self._answers: list[tuple[float, float, list[int]]] = []
+        self._answers: list[Answer] = []
         self._last = [0] * self.block.count
 
     def finding(self, text: str, quantity: str = "") -> Finding:
@@ -143,9 +180,7 @@ class Probe:
             n answers; none where there was none.
         """
         answers, self._answers = self._answers, []
-        asked, answered, words = zip(*answers, strict=True) if answers else ((), (), ())
-        shaped = np.array(words, dtype=np.int64).reshape(len(answers), self.block.count)
-        return Series(self.block, np.array(asked), np.array(answered), shaped)
+        return Series.of_answers(self.block, answers)
 
     def _keep(self, asked: float, words: list[int]) -> None:
         self._answers.append((asked, time.perf_counter(), words))

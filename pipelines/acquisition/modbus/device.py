@@ -20,6 +20,7 @@ from pipelines.acquisition.modbus.reply import (
 )
 from pipelines.errors import DeviceError, Refused, Unanswered
 from pipelines.modbus.register_block import Block
+from pipelines.settings.rig.block import ReadBlock, registers_of
 from pipelines.settings.rig.register_map import Identity
 from pipelines.settings.rig.safety import SafetySettings
 
@@ -74,9 +75,22 @@ class Device:
         self._write = TimeOut(safety.watchdog_s, "watchdog_s")
 
     def move(self, line: Line) -> None:
-        """Join another line to the same place."""
+        """Join a line, in place of the one before."""
         self.label = line.join(self.name, self._unit)
         self.line = line
+
+    async def read_anything(self, identity: Sequence[Identity], block: ReadBlock) -> None:
+        """Read one register, to see whether the device answers.
+
+        Raises
+        ------
+        DeviceError
+            No answer came in time, or an answer that refuses.
+        """
+        first = min(registers_of(block).values(), key=lambda one: one.address)
+        entry = identity[0] if identity else None
+        function = (entry.function if entry else None) or block.function
+        await self.read(entry.address if entry else first.address, 1, function=function)
 
     @property
     def awaited_s(self) -> float:
@@ -236,6 +250,21 @@ class Device:
             write_address=write.address,
             values=list(words),
         )
+
+    async def send(self, request: ModbusPDU) -> None:
+        """Send a request that has no method of its own.
+
+        Raises
+        ------
+        DeviceError
+            No answer came in time, or an answer that refuses.
+        """
+
+        def execute(device_id: int) -> Awaitable[ModbusPDU]:
+            request.dev_id = device_id
+            return self.line.client.execute(False, request)
+
+        await self._request(f"function {request.function_code}", self._at_rest, execute)
 
     async def _ask(
         self,

@@ -55,14 +55,18 @@ class Line:
         check_replies(self.client, not settings.has_transaction_ids, self.ear, self._note_reply)
         self.devices: list[str] = []
         """Names of the devices on it."""
-        self._settings, self._timeout_s, self._name = settings, timeout_s, name
+        self.settings, self._timeout_s, self._name = settings, timeout_s, name
         self._turn = asyncio.Lock()
         self._holder: asyncio.Task | None = None
         """Task that has the turn."""
         self._used = False
         """Whether it has sent a request in its turn."""
-        self._asking = self._failed = self._has_answered = False
-        """Whether a request is under way, the last one was not answered, any ever was answered."""
+        self._asking = self._failed = False
+        """Whether a request is under way, and whether the last one was not answered."""
+        self.has_answered = False
+        """Whether any request was ever answered."""
+        self.takes_one_client = False
+        """Whether the other end serves no second connection."""
         self._answers = 0
         """Answers on this connection."""
         self._closes: bool | None = None
@@ -76,7 +80,7 @@ class Line:
     @property
     def has_transaction_ids(self) -> bool:
         """Whether a reply names the request that it answers."""
-        return self._settings.has_transaction_ids
+        return self.settings.has_transaction_ids
 
     def join(self, name: str, unit: int) -> str:
         """Add a device; return its label in errors."""
@@ -98,12 +102,12 @@ class Line:
             is_open = await self.client.connect()
         except BAD_SETTINGS as error:
             raise DeviceError(
-                f"{self._label}: the serial port cannot be set up like that ({error}); correct"
+                f"{self.label}: the serial port cannot be set up like that ({error}); correct"
                 " baud_rate, parity or stop_bits in the rig file (a pseudo-terminal needs parity ="
                 ' "none")'
             ) from error
         if not is_open:
-            raise DeviceError(f"{self._label}: {await self._refusal()}")
+            raise DeviceError(f"{self.label}: {await self._refusal()}")
 
     def close(self) -> None:
         """Close the connection, if it is open."""
@@ -190,13 +194,13 @@ class Line:
                 self._closes = False
             # The reply to another request counts as an answer, but the next try needs a new
             # connection.
-            self._failed, self._has_answered = isinstance(answer, InvalidReply), True
+            self._failed, self.has_answered = isinstance(answer, InvalidReply), True
             self._asked.pop(unit, None)
             return answer
         except (ModbusException, OSError) as error:
             if self.client.connected:
                 raise
-            raise DeviceError(f"{self._label}: {self._loss()}") from error
+            raise DeviceError(f"{self.label}: {self._loss()}") from error
         finally:
             if self._asking:
                 self._quiet_since = asyncio.get_running_loop().time()
@@ -253,14 +257,15 @@ class Line:
             self._late[unit].came.set()
 
     @property
-    def _label(self) -> str:
+    def label(self) -> str:
+        """Its name in errors; that of its first device where it has none."""
         return f"line {self._name} ({self.place})" if self._name else self.devices[0]
 
     async def _pause(self) -> None:
         """Wait for the pause that separates two frames on the line."""
-        if self._settings.quiet_s:
+        if self.settings.quiet_s:
             loop = asyncio.get_running_loop()
-            await asyncio.sleep(max(0.0, self._quiet_since + self._settings.quiet_s - loop.time()))
+            await asyncio.sleep(max(0.0, self._quiet_since + self.settings.quiet_s - loop.time()))
 
     def _note_connection(self, connected: bool) -> None:
         """End the request that is under way when the connection ends: no reply will come."""
@@ -274,12 +279,12 @@ class Line:
         """Return in words how the connection was lost, and for which devices."""
         others = f", and with it {', '.join(self.devices)}" if self._name else ""
         # With TLS 1.3 a client is refused only after its connection seems complete.
-        if isinstance(self._settings, TlsLine) and not self._has_answered:
+        if isinstance(self.settings, TlsLine) and not self.has_answered:
             return (
                 f"the other end closed the line before its first answer{others}; it does not trust"
                 " the certificate and key in the rig file, or has stopped"
             )
-        if self._has_answered or isinstance(self._settings, RtuLine):
+        if self.has_answered or isinstance(self.settings, RtuLine):
             return f"the line is lost{others}; check cable and power"
         came = self.ear.came
         after = f"after {len(came)} bytes ({as_hex(came)})" if came else "without an answer"
@@ -289,30 +294,35 @@ class Line:
         )
 
     @property
+    def is_lost(self) -> bool:
+        """Whether the other end has closed a connection that it should keep."""
+        return not self.client.connected and not self._closes
+
+    @property
     def peculiarities(self) -> list[str]:
         """What the line does that others do not, in words; it is served all the same."""
         found = []
         if self._closes:
             found.append(
-                f"{self._label}: closes its connection after each answer; each request opens a new"
+                f"{self.label}: closes its connection after each answer; each request opens a new"
                 " one, which takes time"
             )
+        if self.takes_one_client:
+            found.append(f"{self.label}: serves one client; all devices there share a connection")
         if self.ear.echoes:
-            found.append(f"{self._label}: the adapter sends back each request; that is passed over")
+            found.append(f"{self.label}: the adapter sends back each request; that is passed over")
         return found
 
     async def _refusal(self) -> str:
         """Return why there is no connection, which pymodbus only logs."""
         try:
-            if isinstance(self._settings, NetworkLine):
-                await asyncio.get_running_loop().getaddrinfo(
-                    self._settings.host, self._settings.port
-                )
-            if isinstance(self._settings, RtuLine):
+            if isinstance(self.settings, NetworkLine):
+                await asyncio.get_running_loop().getaddrinfo(self.settings.host, self.settings.port)
+            if isinstance(self.settings, RtuLine):
                 serial.Serial(self.place, exclusive=True).close()
-            elif isinstance(self._settings, TlsLine):
+            elif isinstance(self.settings, TlsLine):
                 opening = asyncio.open_connection(
-                    self._settings.host, self._settings.port, ssl=self._tls
+                    self.settings.host, self.settings.port, ssl=self._tls
                 )
                 _, writer = await asyncio.wait_for(opening, self._timeout_s)
                 writer.close()
