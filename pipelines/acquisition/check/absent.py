@@ -31,7 +31,9 @@ async def explain_absence(probe: Probe, probes: Sequence[Probe]) -> Finding | No
         transport = await _other_frames(probe, line)
         if transport:
             return Finding(
-                "rig", f'{line.label}: answers in other frames; set transport = "{transport}"'
+                "rig",
+                f'{line.label}: answers in other frames; set transport = "{transport}" of its'
+                " [line]",
             )
     other = await _other_unit(probe, probes)
     if other is None:
@@ -74,6 +76,7 @@ async def _other_frames(probe: Probe, line: Line) -> str | None:
     # A server may take one client only.
     line.close()
     trial = Line(other, TRIAL_S)
+    trial.ear.trace = line.ear.trace
     device = Device(probe.name, probe.part.settings.unit, trial, SafetySettings(connect_s=TRIAL_S))
     try:
         await trial.connect()

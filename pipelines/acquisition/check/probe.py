@@ -11,10 +11,12 @@ from numpy.typing import NDArray
 from pipelines.acquisition.check.finding import Finding
 from pipelines.acquisition.machine.drive import Drive
 from pipelines.acquisition.machine.force_sensor import Sensor
+from pipelines.acquisition.machine.read_only import ReadOnlyPart
 from pipelines.acquisition.modbus.blocks import BlockReader
 from pipelines.acquisition.modbus.wraparound import Unwrapper
 from pipelines.modbus.register_block import Block
 from pipelines.settings.rig import Register
+from pipelines.settings.rig.devices import SensorSettings
 
 Answer = tuple[float, float, list[int]]
 """When it was asked and answered (host's clock, s), and the words."""
@@ -104,6 +106,8 @@ class Series:
     @property
     def fresh(self) -> NDArray:
         """Indices of the first answer with each new sample, (k,)."""
+        if "sequence" not in self.block.names:
+            return np.arange(len(self.asked))
         is_new = (np.diff(self.raw("sequence"), axis=0) != 0).any(axis=1)
         return np.flatnonzero(np.r_[True, is_new])
 
@@ -117,15 +121,16 @@ class Series:
 class Probe:
     """A drive or sensor of the rig, with its recent answers."""
 
-    def __init__(self, part: Drive | Sensor, in_lockstep: bool) -> None:
+    def __init__(self, part: Drive | Sensor | ReadOnlyPart, in_lockstep: bool) -> None:
         self.part = part
-        self.is_drive = isinstance(part, Drive)
+        self.is_drive = not isinstance(part.settings, SensorSettings)
         self.in_lockstep = in_lockstep
         self.block = part.reader.block
+        settings = part.settings
         kind, place = (
-            ("drive", part.settings.joint)
-            if isinstance(part, Drive)
-            else ("sensor", part.settings.cuff)
+            ("sensor", settings.cuff)
+            if isinstance(settings, SensorSettings)
+            else ("drive", settings.joint)
         )
         self.name = f"{kind} {place}"
         self.place: str = place
@@ -141,7 +146,7 @@ class Probe:
 
     def is_due(self, cycle: int) -> bool:
         """Return whether a run reads the device in a cycle."""
-        return isinstance(self.part, Drive) or self.part.is_due(cycle)
+        return not isinstance(self.part, Sensor) or self.part.is_due(cycle)
 
     async def read(self) -> None:
         """Read the block and keep the answer."""

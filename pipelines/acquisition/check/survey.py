@@ -23,13 +23,16 @@ from pipelines.acquisition.check.zeros import check_zeros
 from pipelines.acquisition.machine.drive import Drive
 from pipelines.acquisition.machine.force_sensor import Sensor
 from pipelines.acquisition.machine.machine import Machine
+from pipelines.acquisition.machine.read_only import ReadOnlyMachine, ReadOnlyPart
 from pipelines.acquisition.modbus.line import Line
 from pipelines.acquisition.modbus.one_client import greet
 from pipelines.acquisition.modbus.wraparound import RATE_TOLERANCE
 from pipelines.acquisition.pacing import SLOW
 from pipelines.errors import DeviceError, Refused
 from pipelines.settings.rig import RigSettings
+from pipelines.settings.rig.recording_only import RecordingRig
 
+Rig = RigSettings | RecordingRig
 TOGETHER_S = 2.0
 DRIVES_S = 1.0
 """Durations of cycles with all devices, and with the drives alone."""
@@ -60,6 +63,8 @@ class RigReport:
 
     rate_hz: float | None
     """The rate of the experiment."""
+    recording_only: bool = False
+    """Whether exoid only reads the machine."""
     by_hand: bool = False
     """Whether a person moved the leg."""
     moved: list[Answer] = field(default_factory=list)
@@ -122,13 +127,51 @@ async def survey(machine: Machine, rate_hz: float | None, *, is_empty: bool) -> 
             probe, device, still, probe.take(), machine.rig, rate_hz, is_empty=is_empty
         )
         report.findings += await _with_likelier(probe, findings, machine.rig, rate_hz)
-    report.notes = list(
-        dict.fromkeys(note for probe in probes for note in probe.part.device.line.peculiarities)
-    )
+    report.notes = _notes(probes)
     report.findings += _check_rates_equal([device for device, _ in present.values()])
     if machine.rig.sampling == "recorder" and not report.findings:
         report.findings += await check_rings(machine, list(present), rate_hz)
     return report
+
+
+async def survey_read_only(
+    machine: ReadOnlyMachine, rig: RecordingRig, rate_hz: float | None
+) -> RigReport:
+    """Read every device of a machine that exoid only reads, and check the answers."""
+    report, answered = RigReport(rate_hz, recording_only=True), list[Probe]()
+    probes = [Probe(part, False) for part in machine.parts]
+    for probe in probes:
+        device = DeviceReport(probe.name, probe.part.device.label)
+        report.devices.append(device)
+        try:
+            await _measure_device(probe, device, answered)
+        except DeviceError as error:
+            report.findings.append(await _explain(probe, error, device, probes, rig, rate_hz))
+            continue
+        answered.append(probe)
+        series = probe.take()
+        device.latency = Latency.of(series.answered - series.asked)
+        findings = list(check_registers(probe, series, rig))
+        if "sequence" in series.block.names:
+            seconds = float(series.answered[-1] - series.answered[0])
+            device.clock = measure_clock(probe, series, seconds)
+            findings += check_clock(probe, series, device.clock, seconds, rate_hz)
+            findings += check_latch(probe, series)
+        report.findings += [
+            *_check_speed(probe, device, rate_hz),
+            *await _with_likelier(probe, findings, rig, rate_hz),
+        ]
+        for name in series.block.names:
+            values = series.of(name)
+            device.values[name], device.noise[name] = float(np.mean(values)), float(np.std(values))
+    report.notes = _notes(probes)
+    return report
+
+
+def _notes(probes: Sequence[Probe]) -> list[str]:
+    """Return what lines do that others do not."""
+    notes = (note for probe in probes for note in probe.part.device.line.peculiarities)
+    return list(dict.fromkeys(notes))
 
 
 async def _connect(probes: Sequence[Probe]) -> dict[Line, DeviceError]:
@@ -149,8 +192,9 @@ async def _connect(probes: Sequence[Probe]) -> dict[Line, DeviceError]:
 
 async def _measure_device(probe: Probe, report: DeviceReport, earlier: Sequence[Probe]) -> None:
     """Read a device's identity, then its block many times."""
-    # Readings of each device alone, and their longest duration.
+    # Readings of each device alone, and their longest duration; a shorter one shows no clock.
     reads, reads_s = 200, 2.0
+    least_s = 1.0 if isinstance(probe.part, ReadOnlyPart) else 0.0
     device, loop = probe.part.device, asyncio.get_running_loop()
     identity, read = probe.part.map.identity, probe.part.map.read
 
@@ -163,11 +207,14 @@ async def _measure_device(probe: Probe, report: DeviceReport, earlier: Sequence[
         (value,) = await device.read(entry.address, 1, function=entry.function or read.function)
         report.identity.append({"address": entry.address, "expected": entry.value, "found": value})
     await device.check_identity(identity, read.function)
-    until = loop.time() + reads_s
-    for k in range(reads):
-        if k and loop.time() > until:
-            break
+    began, count = loop.time(), 0
+    while (
+        not count
+        or (loop.time() < began + reads_s and count < reads)
+        or (loop.time() < began + least_s)
+    ):
         await probe.read()
+        count += 1
 
 
 async def _explain(
@@ -175,7 +222,7 @@ async def _explain(
     error: DeviceError,
     device: DeviceReport,
     probes: Sequence[Probe],
-    rig: RigSettings,
+    rig: Rig,
     rate_hz: float | None,
 ) -> Finding:
     """Return the likeliest mistake in the rig file that explains an error; else the error."""
@@ -271,7 +318,7 @@ def _check_device(
 
 
 async def _with_likelier(
-    probe: Probe, findings: list[Finding], rig: RigSettings, rate_hz: float | None
+    probe: Probe, findings: list[Finding], rig: Rig, rate_hz: float | None
 ) -> list[Finding]:
     """Return the findings about a device, or the one likelier mistake that explains them all."""
     if probe.in_lockstep:
@@ -285,7 +332,7 @@ async def _with_likelier(
 
 
 async def _likelier_block(
-    probe: Probe, misread: Collection[str], rig: RigSettings, rate_hz: float | None
+    probe: Probe, misread: Collection[str], rig: Rig, rate_hz: float | None
 ) -> Finding | None:
     """Return the finding that a block is at other addresses, if all of it is credible there."""
     for moved in moved_blocks(probe, misread):
@@ -295,8 +342,10 @@ async def _likelier_block(
     return None
 
 
-def _is_credible(probe: Probe, series: Series, rig: RigSettings, rate_hz: float | None) -> bool:
+def _is_credible(probe: Probe, series: Series, rig: Rig, rate_hz: float | None) -> bool:
     """Return whether counter, clock and all other registers have possible values."""
+    if "sequence" not in series.block.names:  # nothing else is sure to change
+        return False
     seconds = float(series.answered[-1] - series.answered[0])
     counts_hz = _counts_hz(probe, rig, rate_hz)
     clock = measure_clock(probe, series, seconds)
@@ -306,9 +355,9 @@ def _is_credible(probe: Probe, series: Series, rig: RigSettings, rate_hz: float 
     )
 
 
-def _counts_hz(probe: Probe, rig: RigSettings, rate_hz: float | None) -> float | None:
+def _counts_hz(probe: Probe, rig: Rig, rate_hz: float | None) -> float | None:
     """Return the rate at which a device's counter is expected to count, if it is known."""
-    if rig.sampling == "cyclic":
+    if isinstance(rig, RecordingRig) or rig.sampling == "cyclic":
         return rate_hz
     return rig.record_rate_hz if probe.is_drive else None
 

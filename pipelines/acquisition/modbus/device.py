@@ -21,9 +21,12 @@ from pipelines.acquisition.modbus.reply import (
 from pipelines.errors import DeviceError, Refused, Unanswered
 from pipelines.modbus.register_block import Block
 from pipelines.settings.rig.block import ReadBlock, registers_of
+from pipelines.settings.rig.recording_only import WaitSettings
 from pipelines.settings.rig.register_map import Identity
 from pipelines.settings.rig.safety import SafetySettings
 
+Waits = SafetySettings | WaitSettings
+"""Settings of a rig that say how long answers are awaited."""
 MEANING: dict[int, str] = {
     ExcCodes.ILLEGAL_FUNCTION: "it does not know function {function}",
     ExcCodes.ILLEGAL_ADDRESS: "it has no such register",
@@ -66,7 +69,7 @@ class TimeOut(NamedTuple):
 class Device:
     """One device on a line, which takes one request at a time from all its devices."""
 
-    def __init__(self, name: str, unit: int, line: Line, safety: SafetySettings) -> None:
+    def __init__(self, name: str, unit: int, line: Line, safety: Waits) -> None:
         """Join a line; a rig's safety settings give the time-outs."""
         self.name, self._unit = name, unit
         self.move(line)

@@ -18,6 +18,7 @@ from pipelines.errors import DeviceError
 from pipelines.settings.rig import RigSettings
 from pipelines.settings.rig.devices import DeviceSettings
 from pipelines.settings.rig.line import LineSettings, NetworkLine, RtuLine, TlsLine
+from pipelines.settings.rig.recording_only import RecordingRig
 
 BAD_SETTINGS: tuple[type[Exception], ...] = (ValueError,)
 """Errors of a serial port that cannot be set up as the rig file says."""
@@ -331,7 +332,7 @@ class Line:
         return "refuses the connection; check that the rig is on, and host and port in the rig file"
 
 
-def lines_of(rig: RigSettings) -> Callable[[DeviceSettings], Line]:
+def lines_of(rig: RigSettings | RecordingRig) -> Callable[[DeviceSettings], Line]:
     """Return a function from a device's settings to its line, one for all devices that share it."""
     timeout_s = rig.safety.connect_s
     shared = {name: Line(settings, timeout_s, name) for name, settings in rig.line.items()}

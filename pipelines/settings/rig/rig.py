@@ -22,8 +22,9 @@ from pipelines.settings.rig.devices import (
     SensorSettings,
 )
 from pipelines.settings.rig.geometry import GeometrySettings
-from pipelines.settings.rig.line import LineSettings, TcpLine
+from pipelines.settings.rig.line import LineSettings, TcpLine, check_unit, with_files_beside
 from pipelines.settings.rig.plant import PlantSettings
+from pipelines.settings.rig.recording_only import refuse_recording_only
 from pipelines.settings.rig.register import DIMENSION
 from pipelines.settings.rig.register_map import Maps
 from pipelines.settings.rig.safety import SafetySettings
@@ -114,13 +115,7 @@ class RigSettings(Settings):
                 f"line: two lines lead to {place}; make them one, with all its devices on it"
             )
         for device in devices:
-            # "Modbus over serial line" V1.02, 2.2: 0 is for all devices at once, 248 to 255 are
-            # reserved.
-            if not self.line_of(device).has_transaction_ids and not 1 <= device.unit <= 247:
-                raise ValueError(
-                    f"unit: found {device.unit} on line {device.line}, expected 1 to 247 in RTU"
-                    " frames; 0 and 248 to 255 are for Modbus TCP alone"
-                )
+            check_unit(device.unit, self.line_of(device), device.line)
         for place, unit in repeated((self.line_of(one).place, one.unit) for one in devices):
             raise ValueError(f"unit: two devices have {place} unit {unit}; correct one")
 
@@ -323,10 +318,10 @@ def load_rig(path: Path | str) -> RigSettings:
     SettingsError
         Names the key that is missing or wrong.
     """
+    refuse_recording_only(path)
     rig = load_toml(path, RigSettings)
     # Only here, as the settings themselves do not know in which folder their file is.
-    lines = {name: line.with_files_in(Path(path).parent) for name, line in rig.line.items()}
-    return rig.model_copy(update={"line": lines})
+    return rig.model_copy(update={"line": with_files_beside(rig.line, Path(path))})
 
 
 def _check_block_reach(
