@@ -197,14 +197,17 @@ class _Recorder:
 
 
 class _HostPace:
-    """Rows by this computer's clock."""
+    """Rows by this computer's clock, which begins with the first one."""
 
     def __init__(self, rate_hz: float) -> None:
-        self._rate_hz, self._began = rate_hz, time.perf_counter()
-        self._next = 0
+        self._rate_hz = rate_hz
+        self._began: float | None = None
+        self._next = 1
 
     async def wait(self) -> None:
         """Wait until the next row is due; those that are late are left out."""
+        if self._began is None:
+            return
         passed = (time.perf_counter() - self._began) * self._rate_hz
         self._next = max(self._next, int(np.ceil(passed)))
         await asyncio.sleep((self._next - passed) / self._rate_hz)
@@ -212,20 +215,25 @@ class _HostPace:
 
     def place(self, row: ReadOnlyRow) -> tuple[int, float]:
         """Return the number and the time (s) of a row."""
-        seconds = 0.5 * (row.asked + row.answered) - self._began
-        return round(seconds * self._rate_hz), seconds
+        middle = 0.5 * (row.asked + row.answered)
+        if self._began is None:
+            self._began = middle
+        return round((middle - self._began) * self._rate_hz), middle - self._began
 
 
 class _CounterPace:
     """Rows by the first device's counter."""
 
     def __init__(self, machine: ReadOnlyMachine, rate_hz: float, watchdog_s: float) -> None:
+        self._machine = machine
         self._pace = PhaseLock(rate_hz, machine.count, watchdog_s)
-        self._last = -1
+        self._last: int | None = None
         self._first: tuple[int, float] | None = None
 
     async def wait(self) -> None:
         """Wait until the device has a new sample."""
+        if self._last is None:
+            self._last = await self._machine.count()
         await self._pace.wait(self._last)
 
     def place(self, row: ReadOnlyRow) -> tuple[int, float]:

@@ -37,8 +37,9 @@ class BlockReader:
         DeviceError
             No answer came in time, or an answer that refuses.
         """
-        # With requests that take half a sample, at least one of two tries is within one sample.
-        tries = 4
+        # Each try begins soon after a new sample, so the second already succeeds on a line that
+        # takes less than half a sample; the others are for a busy computer.
+        tries = 8
         for _ in range(tries):
             words = await self._parts(in_motion)
             if len(self.requests) == 1 or self._counter is None:

@@ -295,9 +295,9 @@ class Line:
         )
 
     @property
-    def is_lost(self) -> bool:
-        """Whether the other end has closed a connection that it should keep."""
-        return not self.client.connected and not self._closes
+    def closes(self) -> bool:
+        """Whether the other end closes a connection after one answer."""
+        return bool(self._closes)
 
     @property
     def peculiarities(self) -> list[str]:

@@ -56,8 +56,11 @@ async def greet(
             raise error from None
         shared.takes_one_client = True
         return
-    # Some servers serve the newest client, and end the connection of the one before.
-    if shared and shared.is_lost:
-        own.takes_one_client = True
-        for other in others:
-            other.move(own)
+    # Some servers serve the newest client, and end the connection of the one before. Others end
+    # each connection after an answer, which a second request on this one shows.
+    if shared and not shared.client.connected:
+        await ask()
+        if not own.closes:
+            own.takes_one_client = True
+            for other in others:
+                other.move(own)
