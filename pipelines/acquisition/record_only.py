@@ -2,7 +2,7 @@
 
 The rows are numbered by the first device's counter, or by this computer's clock where it has none.
 They have the time of that device's clock, or the middle between request and answer. The metadata
-tell how far the instants of one row may be apart.
+have how far the instants of one row may be apart.
 """
 
 import asyncio
@@ -158,7 +158,7 @@ class _Recorder:
             if machine.has_counter
             else _HostPace(self._rate_hz)
         )
-        heard_at = reported_at = time.monotonic()
+        answered_at = reported_at = time.monotonic()
         number = -1
         while number < self._planned - 1:
             await pace.wait()
@@ -168,11 +168,11 @@ class _Recorder:
             placed = pace.place(row) if row else None
             if placed and placed[0] > number:
                 assert row
-                number, heard_at = placed[0], now
+                number, answered_at = placed[0], now
                 if number < self._planned:
                     self._widths.append(row.answered - row.asked)
                     journal.append([placed[1], *row.values, number])
-            if now - heard_at > self._watchdog_s:
+            if now - answered_at > self._watchdog_s:
                 raise DeviceError(
                     f"no new sample of all devices for {self._watchdog_s:g} s"
                     " (safety.watchdog_s); check the machine and its lines"

@@ -7,9 +7,10 @@ READ, WRITE = "[map.drive.servo.read]", "[map.drive.servo.write]\n"
 FORCES = "[map.sensor.force.read]\n"
 REAL = {"[plant]\n": "[plant]\nsample_rate_hz = 25.0\n"}
 SHORT_WORDS = {
+    "enable = 0x000F\n": "own_scale = true\nenable = 0x000F\n",
     'reference = { address = 200, type = "int32", scale = 1e-6, unit = "rad" }': (
         'reference = { address = 200, type = "int16", scale = 1e-4, unit = "rad" }'
-    )
+    ),
 }
 
 
@@ -23,7 +24,7 @@ SHORT_WORDS = {
                 READ: f"{READ}\nfunction = 4\nmost_words = 8",
                 WRITE: f"{WRITE}function = 16\n",
             },
-            {3, 4, 16},
+            {4, 16},
         ),
     ],
     ids=["FC16 and FC03", "FC06 for each register", "FC04 of 8 registers, FC16"],

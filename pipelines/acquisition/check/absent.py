@@ -27,6 +27,8 @@ async def explain_absence(probe: Probe, probes: Sequence[Probe]) -> Finding | No
         All devices of the rig; their units are not tried.
     """
     line, unit = probe.part.device.line, probe.part.settings.unit
+    if line.traffic.came and not line.has_answered:  # the bytes say it
+        return None
     if not line.has_answered:
         transport = await _other_frames(probe, line)
         if transport:
@@ -76,7 +78,7 @@ async def _other_frames(probe: Probe, line: Line) -> str | None:
     # A server may take one client only.
     line.close()
     trial = Line(other, TRIAL_S)
-    trial.ear.trace = line.ear.trace
+    trial.traffic.trace = line.traffic.trace
     device = Device(probe.name, probe.part.settings.unit, trial, SafetySettings(connect_s=TRIAL_S))
     try:
         await trial.connect()

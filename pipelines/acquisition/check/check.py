@@ -132,7 +132,7 @@ def _trace(devices: Sequence[Device], trace: TraceLine | None) -> None:
             arrow = ">" if sent else "<"
             trace(f"{time.perf_counter() - began:9.4f} s {place} {arrow} {data.hex(' ')}")
 
-        device.line.ear.trace = show
+        device.line.traffic.trace = show
 
 
 def refuse_to_move_a_person(*, by_hand: bool, move: bool) -> None:

@@ -227,20 +227,20 @@ async def _explain(
 ) -> Finding:
     """Return the likeliest mistake in the rig file that explains an error; else the error."""
     absent = (ExcCodes.GATEWAY_PATH_UNAVIABLE, ExcCodes.GATEWAY_NO_RESPONSE)
-    line, found = probe.part.device.line, None
+    line, finding = probe.part.device.line, None
     try:
         if isinstance(error, Refused) and error.code not in absent:
-            found = await _likelier_block(probe, (), rig, rate_hz)
-            if not found:
+            finding = await _likelier_block(probe, (), rig, rate_hz)
+            if not finding:
                 why = await explain_refusal(probe, error)
-                found = probe.finding(why) if why else None
-        elif not line.ear.came or isinstance(error, Refused):
-            found = await explain_absence(probe, probes)
+                finding = probe.finding(why) if why else None
+        elif isinstance(error, Refused) or not (line.has_answered and line.traffic.came):
+            finding = await explain_absence(probe, probes)
         elif any(entry["found"] != entry["expected"] for entry in device.identity):
-            found = await explain_identity(probe, probes)
+            finding = await explain_identity(probe, probes)
     except DeviceError:
         pass  # it stops answering meanwhile: the first error counts
-    return found or _finding_of(error, [probe])
+    return finding or _finding_of(error, [probe])
 
 
 async def _measure_cycles(present: Sequence[Probe], report: RigReport) -> list[Finding]:

@@ -8,7 +8,6 @@ from pymodbus.constants import ExcCodes
 from pymodbus.exceptions import ModbusException
 from pymodbus.pdu import ModbusPDU
 
-from pipelines.acquisition.modbus.heard import described
 from pipelines.acquisition.modbus.line import Line
 from pipelines.acquisition.modbus.reply import (
     READ_HOLDING,
@@ -18,6 +17,7 @@ from pipelines.acquisition.modbus.reply import (
     WRITE_SINGLE,
     InvalidReply,
 )
+from pipelines.acquisition.modbus.unexpected import described
 from pipelines.errors import DeviceError, Refused, Unanswered
 from pipelines.modbus.register_block import Block
 from pipelines.settings.rig.block import ReadBlock, registers_of
@@ -299,7 +299,7 @@ class Device:
         except (ModbusException, OSError) as error:
             # On an open line the next request may be answered; a lost line ends the run.
             kind = Unanswered if self.line.client.connected else DeviceError
-            came = described(self.line.ear.asked, self.line.ear.came) or (
+            came = described(self.line.traffic.asked, self.line.traffic.came) or (
                 f"did not answer {action} within {time_out.seconds:.3g} s; check cable and power,"
                 f" or raise safety.{time_out.setting} in the rig file"
             )
@@ -317,7 +317,7 @@ class Device:
     def _refusal(self, action: str, response: ModbusPDU) -> Refused:
         """Return the error of an exception reply."""
         code = int(getattr(response, "exception_code", 0))
-        function = self.line.ear.asked.function
+        function = self.line.traffic.asked.function
         meaning = f": {MEANING[code].format(function=function)}" if code in MEANING else ""
         remedy = REMEDY.get(
             code, "compare the register map in the rig file with the device's manual"

@@ -6,16 +6,16 @@ from pymodbus.framer import FramerRTU, FramerSocket
 from pymodbus.framer.base import FramerBase
 from pymodbus.pdu import DecodePDU, ModbusPDU
 
-from pipelines.acquisition.modbus.heard import Asked
+from pipelines.acquisition.modbus.unexpected import Asked
 
 Trace = Callable[[bool, bytes], None]
 """Takes whether bytes were sent, and the bytes."""
-MOST_HEARD = 1024
+MOST_KEPT = 1024
 """Bytes of one request's time that are kept, to describe them."""
 WRITE_SINGLE = 6
 
 
-class Ear:
+class Traffic:
     """The request under way on a line, and all bytes that came since."""
 
     def __init__(self) -> None:
@@ -32,12 +32,12 @@ class Ear:
         self.asked, self.came, self._pending = asked, b"", 0
         self.trace(True, asked.frame)
 
-    def hear(self, data: bytes) -> None:
+    def receive(self, data: bytes) -> None:
         """Note a buffer of bytes, the first of which may have been noted before."""
         new = data[self._pending :]
         if new:
             self.trace(False, new)
-        self.came = (self.came + new)[:MOST_HEARD]
+        self.came = (self.came + new)[:MOST_KEPT]
         self._pending = len(data)
 
     def use(self, count: int) -> None:
@@ -50,24 +50,26 @@ class ListeningFramer(FramerBase):
 
     in_rtu: bool
 
-    def __init__(self, decoder: DecodePDU, ear: Ear) -> None:
+    def __init__(self, decoder: DecodePDU, traffic: Traffic) -> None:
         super().__init__(decoder)
-        self.ear = ear
+        self.traffic = traffic
 
     def buildFrame(self, message: ModbusPDU) -> bytes:
         """Return a request's frame, and remember it."""
         frame = super().buildFrame(message)
         transaction = 0 if self.in_rtu else message.transaction_id
-        self.ear.ask(Asked(frame, message.dev_id, transaction, message.function_code, self.in_rtu))
+        self.traffic.ask(
+            Asked(frame, message.dev_id, transaction, message.function_code, self.in_rtu)
+        )
         return frame
 
     def handleFrame(
         self, data: bytes, exp_devid: int, exp_tid: int
     ) -> tuple[int, ModbusPDU | None]:
         """Return the bytes used, and the answer of the unit that was asked, if it is among them."""
-        self.ear.hear(data)
+        self.traffic.receive(data)
         used, reply = self._find(data, exp_devid, exp_tid)
-        self.ear.use(used)
+        self.traffic.use(used)
         return used, reply
 
     def _find(self, data: bytes, unit: int, transaction: int) -> tuple[int, ModbusPDU | None]:
@@ -110,33 +112,33 @@ class RtuFramer(ListeningFramer, FramerRTU):
     """Whether the echo of the request under way was passed over."""
 
     def buildFrame(self, message: ModbusPDU) -> bytes:
-        """Return a request's frame; its echo is awaited anew."""
+        """Return a request's frame; its echo is awaited again."""
         self._passed = False
         return super().buildFrame(message)
 
     @property
     def _awaits_echo(self) -> bool:
-        if self._passed or not self.ear.asked.frame:
+        if self._passed or not self.traffic.asked.frame:
             return False
         # The answer to FC06 equals its request, so it does not show whether the adapter echoes.
-        if self.ear.echoes is None:
-            return self.ear.asked.function != WRITE_SINGLE
-        return self.ear.echoes
+        if self.traffic.echoes is None:
+            return self.traffic.asked.function != WRITE_SINGLE
+        return self.traffic.echoes
 
     def _echo(self, data: bytes) -> int:
-        sent = self.ear.asked.frame
+        sent = self.traffic.asked.frame
         if not self._awaits_echo or not data.startswith(sent):
             return 0
-        self._passed = self.ear.echoes = True
+        self._passed = self.traffic.echoes = True
         return len(sent)
 
     def _note_answer(self) -> None:
         if self._awaits_echo:
-            self.ear.echoes = False
+            self.traffic.echoes = False
 
     def decode(self, data: bytes) -> tuple[int, int, int, bytes]:
         """Return the length of the first frame, its unit, 0 and its content; 0 to read more."""
         # The beginning of an echo looks like a damaged answer, and pymodbus would discard it.
-        if self._awaits_echo and self.ear.asked.frame.startswith(data):
+        if self._awaits_echo and self.traffic.asked.frame.startswith(data):
             return 0, 0, 0, self.EMPTY
         return super().decode(data)

@@ -11,9 +11,9 @@ from pymodbus.exceptions import ConnectionException, ModbusException
 from pymodbus.pdu import ModbusPDU
 
 from pipelines.acquisition.modbus.connection import client_of, explain, tls_context
-from pipelines.acquisition.modbus.framing import Ear
-from pipelines.acquisition.modbus.heard import as_hex
+from pipelines.acquisition.modbus.framing import Traffic
 from pipelines.acquisition.modbus.reply import InvalidReply, check_replies
+from pipelines.acquisition.modbus.unexpected import as_hex
 from pipelines.errors import DeviceError
 from pipelines.settings.rig import RigSettings
 from pipelines.settings.rig.devices import DeviceSettings
@@ -52,8 +52,8 @@ class Line:
         self.client = client_of(settings, self._tls, timeout_s, self._note_connection)
         # Else pymodbus closes the connection after some missing replies; the watchdog decides that.
         self.client.set_max_no_responses(sys.maxsize)
-        self.ear = Ear()
-        check_replies(self.client, not settings.has_transaction_ids, self.ear, self._note_reply)
+        self.traffic = Traffic()
+        check_replies(self.client, not settings.has_transaction_ids, self.traffic, self._note_reply)
         self.devices: list[str] = []
         """Names of the devices on it."""
         self.settings, self._timeout_s, self._name = settings, timeout_s, name
@@ -185,7 +185,7 @@ class Line:
                 answer = await self._send(unit, within_s, request, arguments)
             except (ModbusException, OSError):
                 # The request may have met a connection that ends after its first answer.
-                ended = not self.client.connected and not self.ear.came and self._answers == 1
+                ended = not self.client.connected and not self.traffic.came and self._answers == 1
                 if not ended or self._closes is False:
                     raise
                 self._closes = True
@@ -287,7 +287,7 @@ class Line:
             )
         if self.has_answered or isinstance(self.settings, RtuLine):
             return f"the line is lost{others}; check cable and power"
-        came = self.ear.came
+        came = self.traffic.came
         after = f"after {len(came)} bytes ({as_hex(came)})" if came else "without an answer"
         return (
             f"the other end closed the line {after}{others}; check transport (TCP or RTU frames),"
@@ -302,17 +302,17 @@ class Line:
     @property
     def peculiarities(self) -> list[str]:
         """What the line does that others do not, in words; it is served all the same."""
-        found = []
+        notes = []
         if self._closes:
-            found.append(
+            notes.append(
                 f"{self.label}: closes its connection after each answer; each request opens a new"
                 " one, which takes time"
             )
         if self.takes_one_client:
-            found.append(f"{self.label}: serves one client; all devices there share a connection")
-        if self.ear.echoes:
-            found.append(f"{self.label}: the adapter sends back each request; that is passed over")
-        return found
+            notes.append(f"{self.label}: serves one client; all devices there share a connection")
+        if self.traffic.echoes:
+            notes.append(f"{self.label}: the adapter sends back each request; that is passed over")
+        return notes
 
     async def _refusal(self) -> str:
         """Return why there is no connection, which pymodbus only logs."""

@@ -11,7 +11,7 @@ from pymodbus.client.base import ModbusBaseClient
 from pymodbus.pdu import DecodePDU, ExceptionResponse, ModbusPDU
 from pymodbus.pdu.file_message import ReadFifoQueueResponse
 
-from pipelines.acquisition.modbus.framing import Ear, RtuFramer, TcpFramer
+from pipelines.acquisition.modbus.framing import RtuFramer, TcpFramer, Traffic
 
 ERROR = 0x80
 READ_HOLDING, READ_INPUT, WRITE_SINGLE, WRITE_MULTIPLE = 3, 4, 6, 16
@@ -132,7 +132,7 @@ class ReplyCheck:
 
 
 def check_replies(
-    client: ModbusBaseClient, in_rtu: bool, ear: Ear, note_reply: Callable[[int], None]
+    client: ModbusBaseClient, in_rtu: bool, traffic: Traffic, note_reply: Callable[[int], None]
 ) -> None:
     """Let a client return only checked replies, and an InvalidReply for any other frame.
 
@@ -140,5 +140,5 @@ def check_replies(
     """
     # pymodbus takes each TLS record for one whole frame, which TLS does not guarantee; so TLS has
     # the frames of TCP.
-    client.ctx.framer = (RtuFramer if in_rtu else TcpFramer)(ReplyDecoder(), ear)
+    client.ctx.framer = (RtuFramer if in_rtu else TcpFramer)(ReplyDecoder(), traffic)
     client.ctx.trace_pdu = ReplyCheck(note_reply)

@@ -168,7 +168,7 @@ LineSettings = Annotated[
 ]
 
 
-def with_files_beside(lines: Mapping[str, LineSettings], rig_file: Path) -> dict[str, LineSettings]:
+def with_files_near(lines: Mapping[str, LineSettings], rig_file: Path) -> dict[str, LineSettings]:
     """Return lines with the paths of their files relative to the folder of a rig file."""
     return {name: line.with_files_in(rig_file.parent) for name, line in lines.items()}
 

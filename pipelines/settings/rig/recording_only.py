@@ -10,7 +10,7 @@ from pipelines.settings.base import Positive, Settings, load_toml
 from pipelines.settings.rig.block import ReadBlock, check_block, registers_of
 from pipelines.settings.rig.devices import ControllerSettings, DeviceSettings, SensorSettings
 from pipelines.settings.rig.geometry import GeometrySettings
-from pipelines.settings.rig.line import LineSettings, TcpLine, check_unit, with_files_beside
+from pipelines.settings.rig.line import LineSettings, TcpLine, check_unit, with_files_near
 from pipelines.settings.rig.register import Register
 from pipelines.settings.rig.register_map import Identity
 from pipelines.validation.toml import read_toml
@@ -181,7 +181,7 @@ def load_recording_rig(path: Path | str) -> RecordingRig:
         Names the key that is missing or wrong.
     """
     rig = load_toml(path, RecordingRig)
-    return rig.model_copy(update={"line": with_files_beside(rig.line, Path(path))})
+    return rig.model_copy(update={"line": with_files_near(rig.line, Path(path))})
 
 
 def refuse_recording_only(path: Path | str) -> None:

@@ -22,7 +22,7 @@ from pipelines.settings.rig.devices import (
     SensorSettings,
 )
 from pipelines.settings.rig.geometry import GeometrySettings
-from pipelines.settings.rig.line import LineSettings, TcpLine, check_unit, with_files_beside
+from pipelines.settings.rig.line import LineSettings, TcpLine, check_unit, with_files_near
 from pipelines.settings.rig.plant import PlantSettings
 from pipelines.settings.rig.recording_only import refuse_recording_only
 from pipelines.settings.rig.register import DIMENSION
@@ -321,7 +321,7 @@ def load_rig(path: Path | str) -> RigSettings:
     refuse_recording_only(path)
     rig = load_toml(path, RigSettings)
     # Only here, as the settings themselves do not know in which folder their file is.
-    return rig.model_copy(update={"line": with_files_beside(rig.line, Path(path))})
+    return rig.model_copy(update={"line": with_files_near(rig.line, Path(path))})
 
 
 def _check_block_reach(

@@ -8,9 +8,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from pipelines.acquisition.modbus.device import Device
-from pipelines.acquisition.modbus.heard import Asked, described
 from pipelines.acquisition.modbus.line import Line
 from pipelines.acquisition.modbus.one_client import greet
+from pipelines.acquisition.modbus.unexpected import Asked, described
 from pipelines.errors import DeviceError, Unanswered
 from pipelines.modbus.register_block import Block
 from pipelines.settings.rig import Register
