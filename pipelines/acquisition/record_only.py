@@ -2,7 +2,7 @@
 
 The rows are numbered by the first device's counter, or by this computer's clock where it has none.
 They have the time of that device's clock, or the middle between request and answer. The metadata
-have how far the instants of one row may be apart.
+give the uncertainty of a row's time.
 """
 
 import asyncio
@@ -27,7 +27,7 @@ from pipelines.contracts import RECORDING
 from pipelines.contracts.atomic import open_folder
 from pipelines.contracts.provenance import describe
 from pipelines.contracts.run_paths import journal_of
-from pipelines.errors import DeviceError, ExoidError
+from pipelines.errors import DeviceError, ExoidError, SettingsError, about
 from pipelines.process.priority import urgent
 from pipelines.settings.acquire import RunSettings
 from pipelines.settings.mechanism import MechanismSettings
@@ -71,6 +71,8 @@ def record_only(
         The recording was refused or ended early; DeviceError where a device was the reason.
     """
     rig = load_recording_rig(rig_path)
+    with about(rig_path):
+        _refuse_other_joints(rig, mechanism)
     RECORDING.refuse_place(output)
     journal_path = journal_of(output)
     refuse_leftover(journal_path)
@@ -90,6 +92,22 @@ def record_only(
             text = recorder.why or "the recording is complete"
             kind = DeviceError if recorder.fault is None else ExoidError
             return record_journal(output, lock, kind, text, recorder.fault)
+
+
+def _refuse_other_joints(rig: RecordingRig, mechanism: MechanismSettings) -> None:
+    """Refuse joints that are not those of the experiment's mechanism, or that slide."""
+    recorded, expected = [joint.joint for joint in rig.drive], mechanism.all_joints
+    if recorded != [joint.name for joint in expected]:
+        raise SettingsError(
+            f"drive: found joints {', '.join(recorded)}, expected those of [mechanism]:"
+            f" {', '.join(joint.name for joint in expected)}"
+        )
+    for joint in expected:
+        if joint.kind != "revolute":
+            raise SettingsError(
+                f"drive: {joint.name} slides, and only turning joints are recorded; use"
+                " `exoid import` for its log"
+            )
 
 
 def _metadata(

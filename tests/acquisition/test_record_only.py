@@ -123,6 +123,15 @@ def test_a_recording_only_file_that_cannot_be_used_is_refused(tmp_path, was, now
     assert "\n" not in str(caught.value)
 
 
+def test_joints_of_another_mechanism_are_refused_before_anything_is_connected(tmp_path):
+    path = tmp_path / "only.toml"
+    text = RIG.format(port=free_port(), clock="", watchdog_s=1.0)
+    path.write_text(text.replace('joint = "knee"', 'joint = "elbow"'))
+    settings = RunSettings(name="one", run="exo_alone", purpose="train", duration_s=1.0)
+    with pytest.raises(SettingsError, match=r"found joints hip, elbow, expected .* hip, knee"):
+        record_only(path, settings, tmp_path / "a.parquet", 40.0, MechanismSettings())
+
+
 def test_no_command_that_moves_takes_a_recording_only_file(tmp_path, exoid):
     path = tmp_path / "only.toml"
     path.write_text(RIG.format(port=free_port(), clock="", watchdog_s=1.0))
