@@ -16,7 +16,6 @@ from exoid_cli.experiment_folder import open_experiment
 from exoid_cli.options import AgainOption, ConfigOption, YesOption, output_option
 from exoid_cli.stage_runner import run_stages
 from pipelines.errors import InputError
-from pipelines.settings.rig.recording_only import is_recording_only
 
 if TYPE_CHECKING:
     from pipelines.acquisition.acquire import Outcome
@@ -68,6 +67,8 @@ def acquire(
       exoid acquire --run with_human_train
       exoid acquire --run with_human_train --trajectory mine.toml -o a.parquet
     """
+    from pipelines.settings.rig.recording_only import is_recording_only
+
     folder = open_experiment(config)
     experiment = folder.experiment
     if run is None:
