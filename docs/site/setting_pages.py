@@ -16,6 +16,7 @@ from pipelines.settings.base import models_in
 from pipelines.settings.experiment import Experiment
 from pipelines.settings.import_map import ImportMap
 from pipelines.settings.rig import RigSettings
+from pipelines.settings.rig.recording_only import RecordingRig
 from pipelines.settings.transmission import GEARED, paths
 from pipelines.settings.units import ALIASES, UNITS
 
@@ -42,6 +43,12 @@ of your own.
 
 ## Outside of all tables
 """
+RECORDING_ONLY = """\
+## With `recording_only = true`, outside of all tables
+
+The tables below differ then; [recording-only.md](recording-only.md) explains them.
+
+"""
 HEAD = "| key | default | meaning |\n|---|---|---|\n"
 
 
@@ -64,7 +71,11 @@ def map_page() -> str:
 def rig_page() -> str:
     """Return docs/rig-keys.md."""
     own = HEAD + "\n".join(rows_of(RigSettings))
-    return _page(RIG, own, *grouped_sections(RigSettings))
+    sections = list(grouped_sections(RigSettings))
+    # Tables that both kinds of rig file have are listed once.
+    read_only = [one for one in grouped_sections(RecordingRig) if one not in sections]
+    only = RECORDING_ONLY + HEAD + "\n".join(rows_of(RecordingRig))
+    return _page(RIG, own, *sections, only, *read_only)
 
 
 PAGES = {"settings": experiment_page, "import-map": map_page, "rig-keys": rig_page}
