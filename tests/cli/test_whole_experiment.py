@@ -15,6 +15,8 @@ from exoid_cli.app import run
 from pipelines.contracts import MOTION, PARAMETERS
 from pipelines.settings.rig import load_rig
 
+pytestmark = pytest.mark.long
+
 CHANGES = {
     # Not seconds: a busy machine would find another motion.
     "iterations = 800 ": "iterations = 50 ",

@@ -38,6 +38,8 @@ from tests.estimation import pendulum
 from tests.identification.conftest import RICH
 from tests.identification.test_two_step import with_noise
 
+pytestmark = pytest.mark.long
+
 HIDDEN = (
     PlantEffect(effect="coulomb_asymmetry", joint="hip", values={"asymmetry": 0.8}),
     PlantEffect(

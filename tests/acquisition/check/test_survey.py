@@ -13,6 +13,8 @@ from pipelines.errors import DeviceError, SettingsError
 from pipelines.rig.device import Device, Sensor
 from pipelines.settings.rig import load_rig
 
+pytestmark = pytest.mark.long
+
 ANGLE = 'angle = { address = 104, type = "int32", scale = 1e-6, unit = "rad" }'
 TIME = 'time = { address = 102, type = "uint32", unit = "us" }'
 VELOCITY = 'velocity = { address = 106, type = "int32", scale = 1e-5, unit = "rad/s" }'
