@@ -1,6 +1,8 @@
 """Build models from ``parameters/1`` tables, and check that their rigid bodies are realizable."""
 
-import pandas as pd
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
 
 from pipelines.contracts.joint_units import FIRST_MOMENT
 from pipelines.effects import RUNS, Effect
@@ -9,6 +11,9 @@ from pipelines.errors import InputError
 from pipelines.mechanics.geometry import Geometry
 from pipelines.mechanics.machine import THE_LEG, Machine
 from pipelines.model.model import Model, Term, effect_named, term_from
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 
 def model_from_parameters(frame: pd.DataFrame, run: str, machine: Machine = THE_LEG) -> Model:
