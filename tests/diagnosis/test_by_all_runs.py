@@ -32,7 +32,7 @@ SLOWEST = replace(RICH, a=0.15 * RICH.a, b=0.15 * RICH.b)
 
 @pytest.fixture(scope="module")
 def diagnosis():
-    return diagnose(session("quadratic_drag", "hip", seed=7, seconds=40.0, trained=POOR, drag=6.0))
+    return diagnosed("quadratic_drag", "hip", seed=7, seconds=40.0, trained=POOR, drag=6.0)
 
 
 def test_a_drag_that_slow_training_runs_do_not_show_is_named_by_all_runs(diagnosis):

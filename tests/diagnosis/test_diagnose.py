@@ -22,7 +22,7 @@ def labels(cause):
 
 @pytest.fixture(scope="module")
 def faultless():
-    return diagnosed()
+    return diagnosed(seconds=40.0)
 
 
 def test_where_nothing_is_hidden_nothing_is_missing(faultless):
@@ -153,7 +153,7 @@ def test_the_tables_keep_their_contracts(faultless):
 
 def test_without_a_run_to_validate_on_no_gain_can_be_measured():
     with pytest.raises(InputError, match="found no run to validate on among: run_0"):
-        diagnose([m for m in session() if m.purpose == "train"])
+        diagnose([m for m in session(seconds=40.0) if m.purpose == "train"])
 
 
 def test_the_command_writes_verdict_and_tables(tmp_path, capsys):

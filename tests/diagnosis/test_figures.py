@@ -43,9 +43,9 @@ DIAGNOSES = {
     "one kind, no periods": lambda: diagnose(
         [replace(m, period_s=None) for m in session(**SPRING) if m.run == "exo_alone"]
     ),
-    "unknown": lambda: diagnose([humming(m) for m in session()]),
+    "unknown": lambda: diagnose([humming(m) for m in session(seed=7, seconds=40.0)]),
     "spoilt": lambda: diagnose([replace(m, torque=m.torque * [1.0, -1.0]) for m in session()]),
-    "nothing": lambda: sessions.diagnosed(),
+    "nothing": lambda: sessions.diagnosed(seconds=40.0),
 }
 NAMED = dict.fromkeys(("explained", "one kind, no periods"), "parallel_spring@knee")
 """What is named in some of them, whatever may be tied with it."""
