@@ -12,6 +12,7 @@ both are repeated with causes sought on all runs.
 
 from collections.abc import Sequence
 
+from pipelines.contracts.fault_kind import FaultKind
 from pipelines.diagnosis.all_runs import by_all_runs
 from pipelines.diagnosis.candidates.library import Report, silent
 from pipelines.diagnosis.diagnosis import Diagnosis
@@ -27,7 +28,10 @@ FIT_SHARE = 0.75
 
 
 def diagnose(
-    motions: Sequence[Motion], report: Report = silent, known: Sequence[str] = ()
+    motions: Sequence[Motion],
+    report: Report = silent,
+    known: Sequence[str] = (),
+    accept: Sequence[FaultKind] = (),
 ) -> Diagnosis:
     """Find where rigid body with Coulomb and viscous friction is wrong, and the cause.
 
@@ -45,6 +49,8 @@ def diagnose(
         Takes the share that is done, 0 to 1, and the present step.
     known : sequence of str, optional
         Labels of effects that the machine is known to have besides rigid body and friction.
+    accept : sequence of FaultKind, optional
+        Kinds of faults of acquisition whose veto the user overrules.
 
     Returns
     -------
@@ -56,7 +62,7 @@ def diagnose(
         Where there is no run to train or to validate on, or an effect in ``known`` cannot be part
         of the baseline.
     """
-    data = training_data(motions, known)
+    data = training_data(motions, known, accept)
     prepared = prepare(data.train, data.baseline)
     selected = nothing_selected(prepared) if data.spoilt else select(prepared, report)
     report(FIT_SHARE, "fit")
