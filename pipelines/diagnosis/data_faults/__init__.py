@@ -16,7 +16,7 @@ from pipelines.contracts.fault_kind import FaultKind
 from pipelines.diagnosis.data_faults.channels import channel_faults
 from pipelines.diagnosis.data_faults.fault import Fault
 from pipelines.diagnosis.data_faults.proof import Ruling, by_good_samples
-from pipelines.diagnosis.data_faults.rigid_fit import averages
+from pipelines.diagnosis.data_faults.rigid_fit import Averages, averages
 from pipelines.diagnosis.data_faults.sampling_instants import sampling_faults
 from pipelines.diagnosis.data_faults.sign import sign_faults
 from pipelines.diagnosis.data_faults.sign_bit import sign_bit_faults
@@ -51,7 +51,7 @@ def find_faults(motions: Sequence[Motion], accept: Sequence[FaultKind] = ()) -> 
         fault for motion in motions for fault in (*timing_faults(motion), *channel_faults(motion))
     ]
     faults = _with_short_runs_left_out(motions, faults, accept)
-    rightly_wired = []
+    legs: list[Averages] = []
     for motion in excluding(motions, faults):
         # A run that is left out whole has nothing to compare.
         if not motion.valid.any():
@@ -60,17 +60,28 @@ def find_faults(motions: Sequence[Motion], accept: Sequence[FaultKind] = ()) -> 
         wrong = [*angle_faults(motion), *angle_unit_faults(motion), *sign_bit_faults(motion)]
         # One wrong channel makes later checks fail as well, so only the first kind is reported.
         wrong = wrong or [*sign_faults(motion)]
-        run = averages(motion) if motion.machine.mechanism is LEG and not wrong else None
-        if run is not None:
-            wrong = [*wiring_faults(run)] or [*cuff_faults(run)]
-            # Exchanged channels look like wrong units, so
-            # only correctly wired runs are compared in scale.
-            rightly_wired += [] if wrong else [run]
         faults += wrong
-    faults += torque_unit_faults(rightly_wired)
+        run = averages(motion) if motion.machine.mechanism is LEG and not wrong else None
+        legs += [] if run is None else [run]
+    faults += _of_legs(legs)
     files = [motion.file for motion in motions]
     judged = [fault.judged(tuple(accept)) for fault in faults]
     return sorted(judged, key=lambda fault: files.index(fault.file))
+
+
+def _of_legs(runs: Sequence[Averages]) -> list[Fault]:
+    """Return wrong wiring, and the wrong units of runs that are wired as they should be."""
+    kinds = dict.fromkeys(run.motion.run for run in runs)
+    faults = [
+        fault
+        for kind in kinds
+        for fault in wiring_faults([run for run in runs if run.motion.run == kind])
+    ]
+    # Exchanged channels look like wrong units, so only correctly wired runs are compared in scale.
+    wrong = {fault.file for fault in faults}
+    faults += [f for run in runs if run.motion.file not in wrong for f in cuff_faults(run)]
+    wrong = {fault.file for fault in faults}
+    return [*faults, *torque_unit_faults([r for r in runs if r.motion.file not in wrong])]
 
 
 def _with_short_runs_left_out(
@@ -121,8 +132,8 @@ def excluding(motions: Sequence[Motion], faults: Iterable[Fault]) -> list[Motion
     bad: dict[str, NDArray] = {}
     for fault in found:
         if fault.samples is not None:
-            others = bad.get(fault.file, np.zeros(len(fault.samples), bool))
-            bad[fault.file] = others | fault.samples
+            before = bad.get(fault.file)
+            bad[fault.file] = fault.samples if before is None else before | fault.samples
     valid = [replace(m, valid=m.valid & ~bad[m.file]) if m.file in bad else m for m in motions]
     # A cuff that is silent would testify that the wearer weighs nothing.
     silent = {fault.file for fault in found if fault.without_cuffs}

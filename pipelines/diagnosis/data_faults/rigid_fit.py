@@ -19,10 +19,10 @@ from pipelines.mechanics.motion import Motion
 from pipelines.signals.blocks import BlockAverage
 
 BLOCK_S = 0.1
-"""Length of the averages on an exoskeleton's scale, s. It is long, because noise of the angles
-would look like acceleration without torque."""
-LEAST_BLOCKS = 50
-"""Fewest averages, five seconds of an exoskeleton's motion, that separate gravity from inertia."""
+"""Length of the averages, s. It is long, because noise of the angles would look like acceleration
+without torque."""
+LEAST_BLOCKS = 30
+"""Fewest averages to which a body is fitted, half of them at a time."""
 FROM_POSITIVE = np.array([[1.0, 1, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]])
 """X1..X4 from (X1 - X2, X2, X3, X4), none of which is negative: M(q) > 0 needs X1 > X2 > 0."""
 POWERS = 3
@@ -50,6 +50,11 @@ class Columns:
     def at(self, rows: NDArray) -> "Columns":
         """Return the columns at some blocks, an index or mask of the m."""
         return Columns(self.positive[rows], self.free[rows])
+
+    def split(self, values: NDArray) -> tuple[NDArray, "Columns"]:
+        """Return the torque (m,) of values that are never negative, and the free columns alone."""
+        p = self.positive.shape[1]
+        return self.positive @ values[:p], Columns(self.positive[:, :0], self.free)
 
     def torque(self, values: NDArray) -> NDArray:
         """Return the torque (m,) of values (p + f,)."""
@@ -144,7 +149,7 @@ def averages(motion: Motion, least: int = LEAST_BLOCKS) -> Averages | None:
     Averages or None
         None where too few blocks are valid.
     """
-    block = BlockAverage.lasting(motion.machine.lasting(BLOCK_S), motion.sample_rate_hz)
+    block = BlockAverage.lasting(BLOCK_S, motion.sample_rate_hz)
     starts = block.starts(motion.segment)
     starts = starts[block.all(motion.valid, starts)]
     if len(starts) < least:

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from pipelines.contracts.fault_kind import FaultKind
 from pipelines.diagnosis.data_faults.fault import Fault, column
 from pipelines.diagnosis.data_faults.mends import mended
-from pipelines.diagnosis.data_faults.proof import Proof, by_motion
+from pipelines.diagnosis.data_faults.proof import Proof, Ruling, by_motion
 from pipelines.mechanics.motion import Motion
 from pipelines.mechanics.origin import mend_in
 
@@ -24,12 +24,19 @@ def sign_bit_faults(motion: Motion) -> Iterator[Fault]:
     for joint in range(len(motion.joints)):
         for quantity in ("torque", "angle"):
             channel = motion.torque if quantity == "torque" else motion.measured_angle
-            far = None if channel is None else _far_branch(channel[:, joint])
-            if channel is None or far is None:
+            if channel is None:
                 continue
-            proof = _proof(motion, quantity, joint, far)
-            if proof is None or not proof.removes_most:
+            # An angle seldom rests near its zero, where a magnitude would show its sign.
+            branches = _far_branches(channel[:, joint], 5 if quantity == "torque" else 1)
+            proofs = [_proof(motion, quantity, joint, far) for far in branches]
+            proven = [
+                (far, proof)
+                for far, proof in zip(branches, proofs, strict=True)
+                if proof is not None and proof.ruling is Ruling.VETO
+            ]
+            if not proven:
                 continue
+            far, proof = min(proven, key=lambda one: one[1].mended)
             name, begin = column(motion, joint, quantity), np.abs(channel[far, joint]).min()
             yield Fault(
                 FaultKind.SIGN_BIT,
@@ -61,23 +68,25 @@ def _proof(motion: Motion, quantity: str, joint: int, far: NDArray) -> Proof | N
     return replace(best, recorded=min(proof.recorded for proof in proofs))
 
 
-def _far_branch(x: NDArray) -> NDArray | None:
-    """Return which of the values (n,) are of the branch farther from zero; None without branches.
+def _far_branches(x: NDArray, most: int) -> list[NDArray]:
+    """Return which of the values (n,) may be of a branch farther from zero.
 
-    The gap between two branches is wider than any step within one.
+    The gap between two branches is wider than any step within one. A magnitude has no sign, so its
+    widest gaps, at most so many, are tried.
     """
     values = np.unique(x)
-    if len(values) < 3:
-        return None
-    k = int(np.argmax(np.diff(values)))
-    low, high = values[k], values[k + 1]
-    upper = x >= high
-    within = np.abs(np.diff(x))[upper[1:] == upper[:-1]]
-    if not len(within) or within.max() >= high - low:
-        return None
-    far = upper if abs(high) > abs(low) else ~upper
-    # The near branch holds small values, the far one none.
-    return far if np.abs(x[~far]).min() < np.abs(x[far]).min() else None
+    gaps = np.argsort(np.diff(values))[::-1][:most]
+    has_one_sign = bool(len(values) > most > 1 and (values[0] >= 0.0 or values[-1] <= 0.0))
+    branches = []
+    for k in gaps if has_one_sign else gaps[:1]:
+        upper = x > values[k]
+        far = upper if abs(values[k + 1]) > abs(values[k]) else ~upper
+        within = np.abs(np.diff(x))[upper[1:] == upper[:-1]]
+        wide = len(within) > 0 and within.max() < values[k + 1] - values[k]
+        # The near branch holds small values, the far one none.
+        is_near = np.abs(x[~far]).min() < np.abs(x[far]).min()
+        branches += [far] if is_near and (wide or has_one_sign) else []
+    return branches
 
 
 def _joined(x: NDArray, far: NDArray) -> list[NDArray]:

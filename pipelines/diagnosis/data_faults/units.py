@@ -63,14 +63,18 @@ def angle_unit_faults(motion: Motion) -> Iterator[Fault]:
     """Yield angles in degrees or another unit: far beyond their set-point or a joint's range."""
     for j, name in enumerate(motion.joints):
         q = motion.q[motion.valid, j]
-        factor = _times_set_point(motion, j)
+        times = _times_set_point(motion, j)
+        factor = times or float(np.degrees(1.0))
         channel = column(motion, j, "angle")
-        if factor and _is_a_unit(factor):
+        if times and _is_a_unit(times):
             # There are 57.3 degrees in a radian; a drive that lags changes the ratio a little.
-            unit = "degrees" if 40 < factor < 80 else "another unit"
-            what = f"in {unit}: it moves {factor:.3g} times as far as its set-point, all along"
-        elif len(q) and motion.machine.is_exoskeleton and np.abs(q).max() > LARGEST_ANGLE_RAD:
-            factor = float(np.degrees(1.0))
+            unit = "degrees" if 40 < times < 80 else "another unit"
+            what = f"in {unit}: it moves {times:.3g} times as far as its set-point, all along"
+        elif (
+            len(q)
+            and motion.machine.joints[j].kind == "revolute"
+            and np.abs(q).max() > LARGEST_ANGLE_RAD
+        ):
             what = (
                 f"not in radians, or its zero is lost: {the(name)} would reach"
                 f" {np.abs(q).max():.3g} rad, as if in degrees"
@@ -84,8 +88,9 @@ def angle_unit_faults(motion: Motion) -> Iterator[Fault]:
             f"{channel} is {what}; {mend_in(motion, 'unit')}",
             proof=_proof_of_angle(motion, j, factor),
         )
-        # A set-point may be in another unit, too.
-        if fault.ruling is not Ruling.REFUTED:
+        # A set-point may be in another unit, too, and a machine that is no leg may turn over.
+        plausible = fault.is_veto or bool(times) or motion.machine.is_exoskeleton
+        if plausible and fault.ruling is not Ruling.REFUTED:
             yield fault
 
 
@@ -302,13 +307,12 @@ def _times_predicted(
     columns, torque = second.columns(joint), second.torque[:, joint]
     values = fit(first.columns(joint), first.torque[:, joint])
     positive = values[: columns.positive.shape[1]]
-    whole = columns.positive @ positive
+    whole, law = columns.split(values)
     factor = float(fit(Columns(whole[:, np.newaxis], columns.free), torque)[0])
     if factor == 0.0 or 1 / WRONG < factor < WRONG:
         return
     friction = columns.positive[:, -2:] @ positive[-2:]
     body = Columns(columns.positive[:, :-2], columns.free)
-    law = Columns(columns.positive[:, :0], columns.free)
     other_load = Prediction(torque, friction + predicted(body, torque - friction))
     scaled = torque / factor
     same = Prediction(scaled, whole + predicted(law, scaled - whole))

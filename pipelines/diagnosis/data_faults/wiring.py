@@ -5,8 +5,7 @@ compared with the torque of a leg (``rigid_fit.py``): a wiring is wrong when ano
 both joints far better.
 """
 
-from collections.abc import Iterator
-from itertools import product
+from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,6 +23,7 @@ from pipelines.diagnosis.data_faults.rigid_fit import (
     Reading,
     cuff_columns,
     fit,
+    joined,
     predicted,
 )
 from pipelines.mechanics.motion import CUFFS, Motion
@@ -101,40 +101,91 @@ def angle_faults(motion: Motion) -> Iterator[Fault]:
             yield _fault(motion, ((j, "angle"), (best, "angle")), SWAP, why, proof)
 
 
-def wiring_faults(run: Averages) -> Iterator[Fault]:
-    """Yield channels that fit a leg only when exchanged or reversed."""
-    # Joints are fitted apart, so that 24 fits serve all combinations.
-    made: dict[tuple[Reading, int, int, float], Prediction] = {}
-    for reading, joint in product((AS_RECORDED, KNEE_REVERSED, EXCHANGED), (HIP, KNEE)):
-        columns = run.columns(joint, reading)
-        for channel, sign in product((HIP, KNEE), (1.0, -1.0)):
-            torque = sign * run.torque[:, channel]
-            made[reading, joint, channel, sign] = Prediction(torque, predicted(columns, torque))
+def wiring_faults(runs: Sequence[Averages]) -> Iterator[Fault]:
+    """Yield channels that fit a leg only when exchanged or reversed, in all runs of a kind or one.
 
-    def under(wiring: Wiring) -> list[Prediction]:
-        reading, channels, signs, *_ = wiring
-        return [made[reading, j, channels[j], signs[j]] for j in (HIP, KNEE)]
+    Parameters
+    ----------
+    runs : sequence of Averages
+        Runs of one kind of one leg.
+    """
+    judged = [Wirings(run) for run in runs]
+    wiring, proof = _best(lambda one: [pair for run in judged for pair in run.under(one)])
+    if wiring is not None:
+        yield from (_of_wiring(run.motion, wiring, proof) for run in runs)
+        return
+    if len(runs) < 2:
+        return
+    for k, run in enumerate(runs):
+        by_others = Wirings(run, [*runs[:k], *runs[k + 1 :]])
+        wiring, proof = _best(by_others.under)
+        if wiring is not None:
+            yield _of_wiring(run.motion, wiring, proof)
 
+
+def _best(
+    under: Callable[[Wiring], Sequence[Prediction]],
+) -> tuple[Wiring | None, Proof]:
+    """Return the wiring that removes most of the error, if any, with its proof."""
     as_recorded = under(WIRINGS[0])
-
-    def proof(wiring: Wiring) -> Proof:
-        at = sorted({joint for joint, quantity in wiring[3] if quantity == "torque"})
-        # An angle takes part in the torque of both joints.
-        at = at if all(quantity == "torque" for _, quantity in wiring[3]) else [HIP, KNEE]
-        mended = under(wiring)
-        return compared([as_recorded[j] for j in at], [mended[j] for j in at], len(wiring[3]))
 
     def misfit(wiring: Wiring) -> float:
         return sum(one.unexplained for one in under(wiring)) / MOST ** len(wiring[3])
 
     best = min(WIRINGS, key=misfit)
-    if best is WIRINGS[0] or not proof(best).removes_most:
-        return
-    mirror = MIRROR_IMAGES.get(best[3], "") if best[4] == SIGN else ""
+    # An angle takes part in the torque of both joints.
+    torques = {joint for joint, quantity in best[3] if quantity == "torque"}
+    at = torques if all(quantity == "torque" for _, quantity in best[3]) else {HIP, KNEE}
+    chosen = [k for k in range(len(as_recorded)) if k % 2 in at or not best[3]]
+    mended = under(best)
+    proof = compared([as_recorded[k] for k in chosen], [mended[k] for k in chosen], len(best[3]))
+    return (best if best[3] and proof.removes_most else None), proof
+
+
+class Wirings:
+    """The torque of both joints of a run under each wiring, and its prediction.
+
+    A body fitted to one half of the run predicts the other half; where other runs are given, one
+    fitted to these, as recorded.
+    """
+
+    def __init__(self, run: Averages, others: Sequence[Averages] = ()) -> None:
+        self.run = run
+        self.bodies = [
+            fit(
+                joined([one.columns(j) for one in others]),
+                np.concatenate([one.torque[:, j] for one in others]),
+            )
+            for j in (HIP, KNEE)
+            if others
+        ]
+        self.known: dict[tuple[Reading, int, int, float], Prediction] = {}
+
+    def under(self, wiring: Wiring) -> list[Prediction]:
+        """Return the predictions at hip and knee under a wiring."""
+        reading, channels, signs, *_ = wiring
+        return [self._one(reading, j, channels[j], signs[j]) for j in (HIP, KNEE)]
+
+    def _one(self, reading: Reading, joint: int, channel: int, sign: float) -> Prediction:
+        key = reading, joint, channel, sign
+        # Joints are fitted apart, so that 24 fits serve all wirings.
+        if key not in self.known:
+            torque, columns = sign * self.run.torque[:, channel], self.run.columns(joint, reading)
+            if self.bodies:
+                # Zeros differ from run to run.
+                whole, law = columns.split(self.bodies[joint])
+                self.known[key] = Prediction(torque, whole + predicted(law, torque - whole))
+            else:
+                self.known[key] = Prediction(torque, predicted(columns, torque))
+        return self.known[key]
+
+
+def _of_wiring(motion: Motion, wiring: Wiring, proof: Proof) -> Fault:
+    mirror = MIRROR_IMAGES.get(wiring[3], "") if wiring[4] == SIGN else ""
     if mirror:
-        mirror = mirror.replace("the hip", the(run.motion.joints[HIP]))
+        mirror = mirror.replace("the hip", the(motion.joints[HIP]))
         mirror = f"reversing {mirror} instead gives the same"
-    yield _fault(run.motion, best[3], best[4], mirror, proof(best))
+    return _fault(motion, wiring[3], wiring[4], mirror, proof)
 
 
 def cuff_faults(run: Averages) -> Iterator[Fault]:
