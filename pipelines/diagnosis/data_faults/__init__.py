@@ -104,11 +104,11 @@ def _with_short_runs_left_out(
             what, samples = f"{fault.what}; this run is left out", np.ones(len(run), bool)
             reported.append(replace(fault, what=what, samples=samples))
         else:
-            proof = by_good_samples(whole_runs[fault.file], run, sound)
+            proof = by_good_samples(whole_runs[fault.file], sound)
             needed = proof is None or (proof.ruling is Ruling.VETO and fault.kind not in accept)
             # Samples that do no harm, or that the user accepts, are used as recorded.
-            samples = fault.samples if needed else None
-            reported.append(replace(fault, samples=samples, proof=proof))
+            left_out = fault.samples if needed else None
+            reported.append(replace(fault, samples=left_out, proof=proof))
     return reported
 
 

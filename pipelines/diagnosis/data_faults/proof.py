@@ -143,15 +143,15 @@ def by_motion(recorded: Motion, mended: Motion | None, channels: int = 1) -> Pro
     return compared(predictions(runs[0]), predictions(runs[1]), channels)
 
 
-def by_good_samples(recorded: Motion, good: Motion, session: Sequence[Motion]) -> Proof | None:
+def by_good_samples(recorded: Motion, session: Sequence[Motion]) -> Proof | None:
     """Return the proof that samples of a run are wrong, of which too few remain to fit a body.
 
-    A body fitted to the good samples of all runs of its kind predicts the samples of the run.
+    A body fitted to the good samples of all runs of its kind predicts these, and the whole run.
 
     Parameters
     ----------
-    recorded, good : Motion
-        The run as it is, and with its wrong samples invalid.
+    recorded : Motion
+        The run as it is.
     session : sequence of Motion
         All runs of the session, without wrong samples.
 
@@ -160,22 +160,19 @@ def by_good_samples(recorded: Motion, good: Motion, session: Sequence[Motion]) -
     Proof or None
         None where too few good samples are in the session.
     """
-    whole, rest = averages(recorded), averages(good, least=1)
+    whole = averages(recorded)
     alike = [averages(motion, least=1) for motion in session if motion.run == recorded.run]
-    runs = [run for run in alike if run is not None]
-    if whole is None or rest is None or sum(len(run.q) for run in runs) < LEAST_BLOCKS:
+    good = [run for run in alike if run is not None]
+    if whole is None or sum(len(run.q) for run in good) < LEAST_BLOCKS:
         return None
-    values = []
+    as_recorded, mended = [], []
     for j in whole.joints:
-        torque = np.concatenate([run.torque[:, j] for run in runs])
-        values.append(fit(joined([run.columns(j) for run in runs]), torque))
-
-    def by_values(run: Averages) -> list[Prediction]:
-        return [
-            Prediction(run.torque[:, j], run.columns(j).torque(values[j])) for j in whole.joints
-        ]
-
-    return compared(by_values(whole), by_values(rest))
+        columns = joined([run.columns(j) for run in good])
+        torque = np.concatenate([run.torque[:, j] for run in good])
+        by_them = whole.columns(j).torque(fit(columns, torque))
+        as_recorded.append(Prediction(whole.torque[:, j], by_them))
+        mended.append(Prediction(torque, predicted(columns, torque)))
+    return compared(as_recorded, mended)
 
 
 def _percent(share: float) -> str:

@@ -64,9 +64,9 @@ def angle_unit_faults(motion: Motion) -> Iterator[Fault]:
     for j, name in enumerate(motion.joints):
         q = motion.q[motion.valid, j]
         times = _times_set_point(motion, j)
-        factor = times or float(np.degrees(1.0))
         channel = column(motion, j, "angle")
         if times and _is_a_unit(times):
+            factor = times
             # There are 57.3 degrees in a radian; a drive that lags changes the ratio a little.
             unit = "degrees" if 40 < times < 80 else "another unit"
             what = f"in {unit}: it moves {times:.3g} times as far as its set-point, all along"
@@ -75,6 +75,7 @@ def angle_unit_faults(motion: Motion) -> Iterator[Fault]:
             and motion.machine.joints[j].kind == "revolute"
             and np.abs(q).max() > LARGEST_ANGLE_RAD
         ):
+            factor, times = float(np.degrees(1.0)), None
             what = (
                 f"not in radians, or its zero is lost: {the(name)} would reach"
                 f" {np.abs(q).max():.3g} rad, as if in degrees"
@@ -89,8 +90,9 @@ def angle_unit_faults(motion: Motion) -> Iterator[Fault]:
             proof=_proof_of_angle(motion, j, factor),
         )
         # A set-point may be in another unit, too, and a machine that is no leg may turn over.
-        plausible = fault.is_veto or bool(times) or motion.machine.is_exoskeleton
-        if plausible and fault.ruling is not Ruling.REFUTED:
+        may_turn = not times and not motion.machine.is_exoskeleton
+        weaker = fault.proof is None or fault.proof.mended >= fault.proof.recorded
+        if fault.ruling is not Ruling.REFUTED and not (may_turn and weaker):
             yield fault
 
 
