@@ -43,7 +43,7 @@ def sign_bit_faults(motion: Motion) -> Iterator[Fault]:
                 motion.file,
                 name,
                 f"{name} has two branches, the second from {begin:.4g} on: a magnitude with a sign"
-                f" bit, read as a plain number; {mend_in(motion, 'signed_bits')}",
+                f" bit, read as a plain number; {mend_in(motion, 'sign_bit')}",
                 proof=proof,
             )
 
