@@ -16,8 +16,8 @@ names. Written by `make vetoes`. Sessions of all worlds of the [blind examinatio
 [real recordings](real-data.md) are examined as they are, and with faults put into them. Most
 sessions hide missing physics besides. Brackets hold Wilson's 95 % interval of a share.
 
-A fault's *share* is the part of the error that it makes, for the model fitted to the sound runs. The
-angle of one joint alone does not show uneven instants, so these are put into two joints only.
+A fault's *share* is the part of the error that it makes, for the model fitted to the sound runs.
+The angle of one joint alone does not show uneven instants: these are put into two joints only.
 """
 
 

@@ -1,4 +1,4 @@
-"""No sound session is stopped, and faults that make a tenth of the error are named: a few of them."""
+"""No sound session is stopped, and faults of a tenth of the error are named: a few of them."""
 
 from dataclasses import replace
 from pathlib import Path
