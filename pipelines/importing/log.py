@@ -16,6 +16,7 @@ from pipelines.importing.time import clock
 from pipelines.importing.time.clock import Run
 from pipelines.settings import transmission
 from pipelines.settings.import_map import ImportMap, ReadingSettings, TimeSettings
+from pipelines.signals.sampling import missing_samples, sample_rate
 from pipelines.validation.suggestion import suggestion
 
 
@@ -154,14 +155,12 @@ class Log:
         time, samples = own[0].time_s + own[0].began_s, values[known][own[0].rows]
         at = run.began_s + run.time_s
         interpolated = np.interp(at, time, samples, left=np.nan, right=np.nan)
-        steps = np.diff(time)
-        gap = steps > clock.longest_step(steps)
-        before = np.clip(np.searchsorted(time, at, "right") - 1, 0, len(steps))
+        gap = missing_samples(time) > 0
+        before = np.clip(np.searchsorted(time, at, "right") - 1, 0, len(gap))
         # A sample at the edge of a gap is known, although the interval behind it is not.
         on_sample = time[before] == at
         interpolated[np.append(gap, False)[before] & ~on_sample] = np.nan
-        rate_hz = 1.0 / np.median(steps)
-        seen = f"sampled at {rate_hz:.4g} Hz by a clock of its own ({reading.time})"
+        seen = f"sampled at {sample_rate(time):.4g} Hz by a clock of its own ({reading.time})"
         note(seen, "interpolated linearly, not across its gaps")
         return interpolated
 

@@ -13,6 +13,7 @@ from pipelines.importing.finding import Finding, Note, counted, noting, unnoted
 from pipelines.importing.quantities.numbers import numbers, whole_nanoseconds
 from pipelines.settings.import_map import TimeSettings
 from pipelines.settings.units import UNITS, unit_named
+from pipelines.signals.sampling import local_period, missing_samples, sample_rate, uneven_share
 
 REGISTERS = (2.0**16, 2.0**31, 2.0**32)
 """Moduli of counters."""
@@ -384,47 +385,28 @@ class Sampling:
     """Shortest, median and longest step, without gaps."""
     irregular: float
     """Share of the steps that are more than 2 % off the median."""
+    rates_hz: tuple[float, float]
+    """Lowest and highest rate that lasts for a tenth of the run or more."""
 
     @classmethod
-    def of(cls, clock_s: NDArray, kept_s: NDArray) -> "Sampling":
+    def of(cls, time_s: NDArray) -> "Sampling":
         """Measure rate, gaps and regularity.
 
         Parameters
         ----------
-        clock_s : (n,) array
-            Times of all rows, s.
-        kept_s : (m,) array
-            Times of the rows that become a recording, s.
+        time_s : (n,) array
+            Times of the samples, s.
         """
-        # In a log of several rates only a few rows have all values, and these have their own rate.
-        steps = np.diff(clock_s if 2 * len(kept_s) > len(clock_s) else kept_s)
-        median = float(np.median(steps))
-        longest = longest_step(steps)
-        regular = steps[steps <= longest]
-        # The mean, as stamps of few digits round the median.
-        period = float(np.mean(regular))
-        kept = np.diff(kept_s)
-        gaps = [
-            (float(kept_s[k] + period), max(1, round(float(kept[k]) / period) - 1))
-            for k in np.flatnonzero(kept > longest)
-        ]
-        irregular = float(np.mean(np.abs(regular - median) > 0.02 * median))
-        limits = (float(regular.min()), median, float(regular.max()))
-        return cls(_rounded(1.0 / period, len(clock_s)), gaps, limits, irregular)
+        steps, missing = np.diff(time_s), missing_samples(time_s)
+        regular = steps[missing == 0]
+        period = local_period(time_s)
+        gaps = [(float(time_s[k] + period[k]), int(missing[k])) for k in np.flatnonzero(missing)]
+        limits = (float(regular.min()), float(np.median(regular)), float(regular.max()))
+        slow, fast = np.quantile(period, (0.9, 0.1))
+        rates_hz = (float(1.0 / slow), float(1.0 / fast))
+        return cls(sample_rate(time_s), gaps, limits, uneven_share(regular), rates_hz)
 
     @property
     def missing(self) -> int:
         """Samples missing in all gaps."""
         return sum(count for _, count in self.gaps)
-
-
-def longest_step(steps: NDArray) -> float:
-    """Return the longest step, s, that is no gap: 1.5 times that of 95 % of all steps (n,)."""
-    # The quantile allows for clocks whose steps vary.
-    return 1.5 * float(np.quantile(steps, 0.95))
-
-
-def _rounded(rate_hz: float, samples: int) -> float:
-    """Round to a whole number of Hz if the last sample moves by less than 1 % of a period."""
-    whole = float(round(rate_hz))
-    return whole if whole and abs(whole - rate_hz) * samples < 0.01 * rate_hz else rate_hz
