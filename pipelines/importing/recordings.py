@@ -19,6 +19,7 @@ from pipelines.importing.log import Log, read_log
 from pipelines.importing.quantities.numbers import TAKEN_FOR_MISSING
 from pipelines.importing.sanity import plausibility
 from pipelines.importing.sources.open import open_source
+from pipelines.importing.time import held
 from pipelines.importing.time.clock import FASTEST_HZ, SLOWEST_HZ, Run, Sampling
 from pipelines.importing.time.period import repeats_after
 from pipelines.settings.import_map import ImportMap, RecordingSettings
@@ -137,6 +138,10 @@ def _recordings_of(
 ) -> Iterator[Imported]:
     path, findings = log.source.path, [*log.findings, *run.findings]
     columns = log.quantities(run, findings)
+    if settings.time.keep == "new":
+        run, columns = held.only_new(run, columns, log.required, findings)
+    else:
+        findings += held.remarks(run, columns)
     whole = _whole_rows(columns, log.required, findings)
     time = run.time_s[whole]
     sampling = Sampling.of(time)

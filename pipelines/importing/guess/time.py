@@ -262,9 +262,10 @@ def _step(values: NDArray, coarse: bool) -> float:
 
 def _breaks(values: NDArray, unit: str) -> tuple[float | None, bool]:
     """Return the modulus of a clock that wraps around, if any, and whether it starts over."""
-    runs = runs_of(values, unit)
+    runs, count_s = runs_of(values, unit), UNITS[unit].factor
+    step = clock.period(values)
     full = [
-        clock.full_register(values[before.rows[-1]], values[after.rows[0]])
+        clock.full_clock(values[before.rows[-1]], values[after.rows[0]], step, count_s)
         for before, after in itertools.pairwise(runs)
     ]
     # A register is full at the same reading each time; breaks that differ are restarts.
@@ -277,4 +278,4 @@ def runs_of(stamps: NDArray, unit: str) -> list[clock.Run]:
     """Return the runs of a clock with these stamps (n,)."""
     stamps = clock.whole(stamps) if stamps.dtype.kind in "iu" else stamps
     time_s = (stamps - clock.first_stamp(stamps)).astype(float) * UNITS[unit].factor
-    return clock.runs(time_s, stamps)
+    return clock.runs(time_s, stamps, UNITS[unit].factor)
