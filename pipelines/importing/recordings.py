@@ -141,7 +141,7 @@ def _recordings_of(
     if settings.time.keep == "new":
         run, columns = held.only_new(run, columns, log.required, findings)
     else:
-        findings += held.remarks(run, columns)
+        findings += held.remarks(run, {name: columns[name] for name in log.required})
     whole = _whole_rows(columns, log.required, findings)
     time = run.time_s[whole]
     sampling = Sampling.of(time)

@@ -2,19 +2,24 @@
 
 import itertools
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from pipelines.importing.guess.motion import FROM_NAME
+from pipelines.importing.guess.joints import JointColumns
+from pipelines.importing.guess.motion import CLEAR, EXACT, FROM_NAME, factors
 from pipelines.importing.guess.names import Meaning
 from pipelines.importing.guess.proposal import Proposal
+from pipelines.importing.quantities.consistency import integral_agreement
+from pipelines.importing.quantities.numbers import are_whole
 from pipelines.importing.time import clock
 from pipelines.settings.units import UNITS
 
 ADVANCES = 0.9
 """Least share of the steps of a clock that go forward."""
+LONG = ("min", "h", "d")
+"""Units that a clock with decimals may have, though few do."""
 USUAL = 2.0
 """Factor on the median within which stamps of a coarse clock are usual, in rows and in distance."""
 
@@ -34,6 +39,15 @@ class TimeGuess:
     """Rate of uniform rows, where the clock is too coarse; else None."""
     pause_s: float = 0.0
     """Longest step of a coarse clock without rows, s."""
+    scale: float = 1.0
+    """Units in a count of the stamps."""
+    others: tuple[tuple[str, float], ...] = ()
+    """Units and scales that give a usual rate, too."""
+
+    @property
+    def count_s(self) -> float:
+        """Duration of a count of the stamps, s."""
+        return UNITS[self.unit].factor * self.scale
 
     def stamps(self, values: NDArray) -> NDArray:
         """Return the stamps of rows.
@@ -50,7 +64,7 @@ class TimeGuess:
         """
         if self.rate_hz is None:
             return values
-        return np.arange(len(values)) / (self.rate_hz * UNITS[self.unit].factor)
+        return np.arange(len(values)) / (self.rate_hz * self.count_s)
 
 
 def guess_time(
@@ -96,35 +110,127 @@ def _guess(
 ) -> TimeGuess | None:
     """Return a column as a clock; None where no unit gives a usual rate."""
     step = _step(values, coarse)
-    fitting = clock.usual_units(step)
-    known = _unit(meaning, typed)
-    if known is None and not fitting:
+    known, epoch = _unit(meaning, typed), _epoch(values, step)
+    fitting = [(known, 1.0)] if known else _scales(values, step)
+    if epoch and not known:
+        fitting = [epoch[:2], *(one for one in fitting if one != epoch[:2])]
+    if not fitting:
         return None
-    # Usual rates span three decades, so that mostly one unit fits.
-    unit = known or fitting[0]
-    rate_hz = _rate_hz(step, unit)
-    is_usual, is_named = unit in clock.usual_units(step, [unit]), meaning.quantity == "time"
+    unit, scale = fitting[0]
+    count_s = UNITS[unit].factor * scale
+    rate_hz = 1.0 / (step * count_s)
+    is_usual = clock.SLOWEST_HZ <= rate_hz <= clock.FASTEST_HZ
+    is_named = meaning.quantity == "time"
+    others = () if known or epoch else tuple(fitting[1:])
     if known:
         by_type = {"iso8601": "dates written out", "ns": "durations, here in whole ns"}
         why = f"{by_type.get(typed.get(meaning.column, ''), FROM_NAME)}: {rate_hz:.4g} Hz"
+    elif epoch:
+        why = f"{epoch[2]}: {rate_hz:.4g} Hz"
     else:
         why = f"steps of {step:.4g} are {rate_hz:.4g} Hz in {unit}, and no rate in another"
+        if others:
+            rates = (f"{1.0 / (step * UNITS[u].factor * k):.4g} Hz in {k:g} {u}" for u, k in others)
+            why = (
+                f"steps of {step:.4g} are {rate_hz:.4g} Hz in {scale:g} {unit}, {', '.join(rates)}"
+            )
     if not is_named:
         why += "; no name shows which column is the time"
     if not is_usual:
-        why += f", no usual rate: is it {' or '.join(fitting) or 'another column'}?"
-    wraps_at, restarts = _breaks(values, unit)
+        usual = clock.usual_units(step)
+        why += f", no usual rate: is it {' or '.join(usual) or 'another column'}?"
+    wraps_at, restarts = _breaks(values, count_s)
     return TimeGuess(
         meaning.column,
         unit,
         why,
         sure=is_named,
-        unit_sure=is_named and is_usual,
+        unit_sure=is_named
+        and is_usual
+        and not others
+        and (unit not in LONG or bool(known or epoch)),
         wraps_at=wraps_at,
         restarts=restarts,
         rate_hz=rate_hz if coarse else None,
-        pause_s=_longest_pause(values) * UNITS[unit].factor if coarse else 0.0,
+        pause_s=_longest_pause(values) * count_s if coarse else 0.0,
+        scale=scale,
+        others=others,
     )
+
+
+def _scales(values: NDArray, step: float) -> list[tuple[str, float]]:
+    """Return units, and scales, of a clock (n,) of such a step that give a usual rate.
+
+    Whole numbers may count ticks of any power of ten of a second: several powers give a usual
+    rate, so that nothing but a name, a date or the motion decides.
+    """
+    tried = [(unit, 1.0) for unit in ("s", "ms", "us", "ns")]
+    if are_whole(values):
+        tried += [("100ns", 1.0), ("ms", 0.1), ("us", 10.0), ("ms", 10.0), ("s", 0.1), ("ns", 10.0)]
+    else:
+        tried += [(unit, 1.0) for unit in LONG]
+    usual = [one for one in tried if clock.usual_units(step * one[1], [one[0]])]
+    # A clock with decimals is hardly one in minutes, if it may be one in seconds.
+    return usual if are_whole(values) else usual[:1]
+
+
+def _epoch(values: NDArray, step: float) -> tuple[str, float, str] | None:
+    """Return unit, scale and words of a clock whose first stamp is a date of our time, if any."""
+    known = values[np.isfinite(values)]
+    dates = (
+        *(
+            (unit, 0.9e9 / UNITS[unit].factor, 2.6e9 / UNITS[unit].factor, "dates since 1970")
+            for unit in ("s", "ms", "us", "ns")
+        ),
+        ("s", 2.9e9, 4.7e9, "seconds since 1904, as LabVIEW counts"),
+        ("100ns", 1.25e17, 1.45e17, "a FILETIME, since 1601"),
+        ("100ns", 6.3e17, 6.6e17, "ticks of .NET, since the year 1"),
+        ("d", 7.2e5, 7.6e5, "days of MATLAB's datenum"),
+        ("d", 3.6e4, 6e4, "days of a spreadsheet, since 1900"),
+    )
+    for unit, least, most, words in dates:
+        if len(known) and least < known[0] < most and clock.usual_units(step, [unit]):
+            return unit, 1.0, words
+    return None
+
+
+def settled(
+    guess: TimeGuess,
+    joints: Sequence[JointColumns],
+    columns: Mapping[str, NDArray],
+    time_s: NDArray,
+) -> TimeGuess:
+    """Return the clock in the unit in which a velocity integrates to its angle.
+
+    Parameters
+    ----------
+    guess : TimeGuess
+        The clock.
+    joints : sequence of JointColumns
+        The joints.
+    columns : mapping of str to (n,) array
+        Columns of a run.
+    time_s : (n,) array
+        Its times by this guess, s.
+    """
+    for joint in joints if guess.others else ():
+        if not {"angle", "velocity"} <= joint.columns.keys():
+            continue
+        angle, velocity = (joint.columns[name] for name in ("angle", "velocity"))
+        agreement = integral_agreement(
+            time_s, *(columns[m.column].astype(float) for m in (angle, velocity))
+        )
+        if agreement is None or agreement.explained < CLEAR:
+            continue
+        for unit, scale in ((guess.unit, guess.scale), *guess.others):
+            slope = abs(agreement.slope) * UNITS[unit].factor * scale / guess.count_s
+            if any(
+                abs(factor - 1.0) < EXACT for factor in factors(slope, angle.unit, velocity.unit)
+            ):
+                named = guess.sure and bool(angle.unit and velocity.unit)
+                why = f"{guess.why}; in {scale:g} {unit} the velocity integrates to the angle"
+                return replace(guess, unit=unit, scale=scale, why=why, unit_sure=named)
+    return guess
 
 
 def _unit(meaning: Meaning, typed: Mapping[str, str]) -> str | None:
@@ -152,7 +258,7 @@ def _finer(
         if any(
             # The rates of two clocks of the same rows differ by less than 10 %. A finer clock must
             # not start over: a coarse one never goes back.
-            abs(hz / rate - 1.0) < 0.1 and not _breaks(values, unit)[1]
+            abs(hz / rate - 1.0) < 0.1 and not _breaks(values, UNITS[unit].factor)[1]
             for unit, hz in own
             for rate in rates
         ):
@@ -173,9 +279,12 @@ def _rate_hz(step: float, unit: str) -> float:
     return 1.0 / (step * UNITS[unit].factor)
 
 
-def write_time(proposal: Proposal, guess: TimeGuess) -> None:
-    """Write the clock's table."""
+def write_time(proposal: Proposal, guess: TimeGuess, held: Sequence[str]) -> None:
+    """Write the clock's table; ``held`` are columns that repeat values between new ones."""
     proposal.table("[time]", "time")
+    if held:
+        why = f"{', '.join(held)} repeat their values between new ones"
+        proposal.key("keep", "new", why)
     if guess.rate_hz is not None:
         why = f"several rows have one stamp of {guess.column}; taken for uniform, in {guess.unit}"
         if guess.pause_s:
@@ -189,6 +298,8 @@ def write_time(proposal: Proposal, guess: TimeGuess) -> None:
         why += ", as no other does"
     proposal.key("column", guess.column, why, guess.sure)
     proposal.key("unit", guess.unit, guess.why, guess.unit_sure)
+    if guess.scale != 1.0:
+        proposal.key("scale", guess.scale, "as of the unit", guess.unit_sure)
     if guess.wraps_at:
         proposal.key("wraps_at", guess.wraps_at, "goes back where such a counter is full")
     elif guess.restarts:
@@ -260,9 +371,9 @@ def _step(values: NDArray, coarse: bool) -> float:
     return clock.period(values)
 
 
-def _breaks(values: NDArray, unit: str) -> tuple[float | None, bool]:
+def _breaks(values: NDArray, count_s: float) -> tuple[float | None, bool]:
     """Return the modulus of a clock that wraps around, if any, and whether it starts over."""
-    runs, count_s = runs_of(values, unit), UNITS[unit].factor
+    runs = runs_of(values, count_s)
     step = clock.period(values)
     full = [
         clock.full_clock(values[before.rows[-1]], values[after.rows[0]], step, count_s)
@@ -274,8 +385,8 @@ def _breaks(values: NDArray, unit: str) -> tuple[float | None, bool]:
     return None, len(runs) > 1
 
 
-def runs_of(stamps: NDArray, unit: str) -> list[clock.Run]:
-    """Return the runs of a clock with these stamps (n,)."""
+def runs_of(stamps: NDArray, count_s: float) -> list[clock.Run]:
+    """Return the runs of a clock with these stamps (n,), whose counts last so long, s."""
     stamps = clock.whole(stamps) if stamps.dtype.kind in "iu" else stamps
-    time_s = (stamps - clock.first_stamp(stamps)).astype(float) * UNITS[unit].factor
-    return clock.runs(time_s, stamps, UNITS[unit].factor)
+    time_s = (stamps - clock.first_stamp(stamps)).astype(float) * count_s
+    return clock.runs(time_s, stamps, count_s)
