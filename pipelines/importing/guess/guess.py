@@ -51,7 +51,7 @@ def propose(paths: Sequence[Path]) -> Proposal:
             raise InputError(_no_clock(names, columns))
     for path in paths[1:]:
         _check_columns(path, source)
-    columns[time.column] = time.stamps(columns[time.column])
+    columns[time.column] = time.stamps(*(columns[name] for name in time.columns))
     # Within one run, because integrals and fits across a restart of the clock mean nothing.
     run = max(runs_of(columns[time.column], time.count_s), key=len)
     rows = len(columns[time.column])
@@ -77,7 +77,7 @@ def propose(paths: Sequence[Path]) -> Proposal:
         proposal.remark(f"Read as {source.format}: {note}.")
     repeats = [name for joint in joints for name in _held(joint, of_run)]
     write_time(proposal, time, repeats)
-    used = {time.column}
+    used = {*time.columns}
     alone = len(joints) == 1
     for number, joint in enumerate(joints):
         used |= set(write_joint(proposal, number, joint, of_run, run.time_s, alone))
@@ -183,10 +183,11 @@ def _period(path: Path, time: TimeGuess, joints: Sequence[JointColumns]) -> floa
         m.column for joint in joints for quantity, m in joint.columns.items() if quantity in MOTION
     }
     with about(path):
-        columns = open_source(path, SourceSettings()).load([time.column, *names])
+        columns = open_source(path, SourceSettings()).load([*time.columns, *names])
     motion = {name: _numeric(columns[name]) for name in names}
-    logged = columns[time.column]
-    stamps = time.stamps(whole_nanoseconds(logged) if time.unit == "iso8601" else _numeric(logged))
+    logged = (columns[name] for name in time.columns)
+    as_numbers = whole_nanoseconds if time.unit == "iso8601" else _numeric
+    stamps = time.stamps(*map(as_numbers, logged))
     for values in (stamps, *motion.values()):
         if values.dtype.kind not in "iuf" or len(values) != len(stamps):
             return None

@@ -1,7 +1,7 @@
 """Choose the column of the clock, and its unit."""
 
 import itertools
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -43,25 +43,41 @@ class TimeGuess:
     """Units in a count of the stamps."""
     others: tuple[tuple[str, float], ...] = ()
     """Units and scales that give a usual rate, too."""
+    plus: str | None = None
+    """Column of the fractions of a second."""
+    plus_unit: str = "ns"
+    rivals: tuple[str, ...] = ()
+    """Other clocks of the log, with other times."""
+
+    @property
+    def columns(self) -> list[str]:
+        """The columns of the clock."""
+        return [self.column] if self.plus is None else [self.column, self.plus]
 
     @property
     def count_s(self) -> float:
         """Duration of a count of the stamps, s."""
+        if self.plus is not None:
+            return UNITS[self.plus_unit].factor
         return UNITS[self.unit].factor * self.scale
 
-    def stamps(self, values: NDArray) -> NDArray:
+    def stamps(self, values: NDArray, plus: NDArray | None = None) -> NDArray:
         """Return the stamps of rows.
 
         Parameters
         ----------
         values : (n,) array
             The clock's column.
+        plus : (n,) array, optional
+            The column of the fractions.
 
         Returns
         -------
         (n,) array
             In the clock's unit.
         """
+        if plus is not None:
+            return _together(values, plus, self.plus_unit)
         if self.rate_hz is None:
             return values
         return np.arange(len(values)) / (self.rate_hz * self.count_s)
@@ -86,6 +102,9 @@ def guess_time(
     TimeGuess or None
         None where no column is a clock.
     """
+    of_two = _of_two_columns(columns)
+    if of_two is not None:
+        return of_two
     advancing = [m for m in meanings if _advances(columns[m.column], m.quantity == "time")]
     coarse = [
         m
@@ -101,8 +120,61 @@ def guess_time(
     for meaning in sorted(candidates, key=lambda m: m.unit is None):
         guess = _guess(meaning, columns[meaning.column].astype(float), meaning in coarse, typed)
         if guess is not None:
-            return guess
+            clocks = [(m.column, _unit(m, typed) or guess.unit) for m in named + coarse]
+            return replace(guess, rivals=tuple(_rivals(guess, clocks, columns)))
     return None
+
+
+def _of_two_columns(columns: Mapping[str, NDArray]) -> TimeGuess | None:
+    """Return the clock of a log that has whole seconds and their fractions in two columns."""
+    whole = {
+        name: values
+        for name, values in columns.items()
+        if values.dtype.kind in "iu" and len(values) > 9
+    }
+    for seconds, values in whole.items():
+        steps = np.diff(values.astype(float))
+        if not (steps.any() and np.isin(steps, (0.0, 1.0)).all() and np.mean(steps) < 0.5):
+            continue
+        for name, fractions in whole.items():
+            full = next((unit for unit in ("us", "ns") if _fills(fractions, unit)), None)
+            # The fractions start over where a second is full, and nowhere else.
+            if full and np.array_equal(np.diff(fractions.astype(float)) < 0.0, steps > 0.0):
+                step = clock.period(_together(values, fractions, full).astype(float))
+                why = f"seconds, with fractions in {name}: {_rate_hz(step, full):.4g} Hz"
+                return TimeGuess(
+                    seconds, "s", why, True, True, None, False, plus=name, plus_unit=full
+                )
+    return None
+
+
+def _fills(fractions: NDArray, unit: str) -> bool:
+    """Return whether whole numbers (n,) are fractions of a second in a unit."""
+    full = 1.0 / UNITS[unit].factor
+    return bool(len(fractions)) and 0 <= fractions.min() and 0.5 * full < fractions.max() < full
+
+
+def _together(seconds: NDArray, fractions: NDArray, unit: str) -> NDArray:
+    """Return the stamps of seconds (n,) and their fractions, in the unit of these."""
+    return seconds.astype(np.int64) * round(1.0 / UNITS[unit].factor) + fractions.astype(np.int64)
+
+
+def _rivals(
+    guess: TimeGuess, clocks: Sequence[tuple[str, str]], columns: Mapping[str, NDArray]
+) -> Iterator[str]:
+    """Yield the other named clocks, with their units, that have other times than the guess."""
+    time_s = columns[guess.column].astype(float) * guess.count_s
+    for name, unit in clocks:
+        other_s = columns[name].astype(float) * UNITS[unit].factor
+        if name == guess.column or len(other_s) != len(time_s):
+            continue
+        # Clocks of two devices are apart by a little, or drift. A date, and the time since the log
+        # began, are far apart, and always by the same.
+        apart, period = other_s - time_s, clock.period(time_s)
+        if np.nanmax(apart) - np.nanmin(apart) > 0.5 * period or (
+            0.01 * period < abs(np.nanmedian(apart)) < 1.0
+        ):
+            yield name
 
 
 def _guess(
@@ -296,13 +368,19 @@ def write_time(proposal: Proposal, guess: TimeGuess, held: Sequence[str]) -> Non
         why += ", but starts over"
     if not guess.sure:
         why += ", as no other does"
-    proposal.key("column", guess.column, why, guess.sure)
+    if guess.rivals:
+        why += f", and so does {' and '.join(guess.rivals)}: name it as `time` of its channels"
+    proposal.key("column", guess.column, why, guess.sure and not guess.rivals)
     proposal.key("unit", guess.unit, guess.why, guess.unit_sure)
+    if guess.plus is not None:
+        proposal.key("plus", guess.plus, "starts over with each second")
+        proposal.key("plus_unit", guess.plus_unit)
     if guess.scale != 1.0:
         proposal.key("scale", guess.scale, "as of the unit", guess.unit_sure)
-    if guess.wraps_at:
+    # Times of day go on after midnight by themselves.
+    if guess.wraps_at and guess.unit != "iso8601":
         proposal.key("wraps_at", guess.wraps_at, "goes back where such a counter is full")
-    elif guess.restarts:
+    elif guess.restarts and not guess.wraps_at:
         why = 'the clock starts over; "split" makes a recording of each run'
         proposal.key("restarts", "longest", why, sure=False)
 
