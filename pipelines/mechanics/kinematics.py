@@ -1,14 +1,15 @@
 """Compute a motion from a recording: filtered angles, derivatives, segments, valid samples."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pyarrow as pa
 from numpy.typing import NDArray
-from scipy.interpolate import CubicSpline
+from scipy.interpolate import Akima1DInterpolator, CubicSpline
 
 from pipelines.contracts.joints import Joint
 from pipelines.contracts.table import Rows, Table
@@ -268,6 +269,11 @@ class _Grid:
     def __init__(self, stretches: Stretches, number: int, rate_hz: float) -> None:
         self._origin_s = stretches.origin_s[number]
         self._uniform = stretches.uniform[number]
+        # A wrong stamp makes a spline overshoot in the long step beside it, which is no noise that
+        # a low-pass averages out. Between nearly even samples a spline is more accurate.
+        self._between: Callable[[NDArray, NDArray], Any] = CubicSpline
+        if stretches.uneven:
+            self._between = partial(Akima1DInterpolator, method="makima")
         self._rate_hz = rate_hz
 
     def filtered(
@@ -293,4 +299,4 @@ class _Grid:
         first = int(np.ceil((time[0] - self._origin_s) * self._rate_hz))
         last = int((time[-1] - self._origin_s) * self._rate_hz)
         grid = self._origin_s + np.arange(first, last + 1) / self._rate_hz
-        return grid, CubicSpline(time, angle)(grid)
+        return grid, np.asarray(self._between(time, angle)(grid))

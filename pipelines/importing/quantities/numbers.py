@@ -164,7 +164,7 @@ def _likelier(one: pd.Series, other: pd.Series) -> pd.Series:
     follow = [bool((step.abs() < day).all()) for step in steps]
     if follow[0] != follow[1]:
         return one if follow[0] else other
-    return pd.Series(pd.NaT, index=one.index).astype("datetime64[ns, UTC]")
+    return one.mask(one.notna())
 
 
 def are_whole(values: NDArray) -> bool:
