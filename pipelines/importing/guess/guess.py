@@ -91,7 +91,9 @@ def propose(paths: Sequence[Path]) -> Proposal:
 
 def _held(joint: JointColumns, columns: Mapping[str, NDArray]) -> list[str]:
     """Return the columns of a joint's angle and torque whose values are held between new ones."""
-    needed = [joint.columns[name] for name in ("angle", joint.drive) if name in joint.columns]
+    needed = [
+        joint.columns[name] for name in ("angle", joint.drive) if name and name in joint.columns
+    ]
     return [m.column for m in needed if are_held(columns[m.column].astype(float))]
 
 
