@@ -99,6 +99,9 @@ def grouped_sections(model: type[BaseModel]) -> Iterator[str]:
     """Yield a section of Markdown for each kind of table below a model, with all its headings."""
     # Most headings of a section's title; more stand below it.
     most = 6
+    # Least number of rows that are not repeated, but named with their other table.
+    many = 10
+    above: dict[str, str] = {}
     headings: dict[type[BaseModel], dict[str, None]] = {}
     for heading, inner in sections_of(model):
         headings.setdefault(inner, {})[f"`{heading}`"] = None
@@ -109,6 +112,12 @@ def grouped_sections(model: type[BaseModel]) -> Iterator[str]:
         title, about = ", ".join(names), inner.__doc__ or ""
         if len(names) > most:
             title, about = inner.__name__, f"{about}\n\nTables: {title}."
+        repeated = [row for row in rows if row in above]
+        if len(repeated) >= many:
+            first, last = (row.split("|")[1].strip() for row in (repeated[0], repeated[-1]))
+            about = f"{about}\n\n{first} to {last} as of {above[repeated[0]]}; in addition:"
+            rows = [row for row in rows if row not in above]
+        above |= dict.fromkeys(rows, title.split(",")[0])
         yield f"## {title}\n\n{about}\n\n{HEAD}" + "\n".join(rows)
 
 

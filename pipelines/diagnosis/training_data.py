@@ -16,6 +16,7 @@ from pipelines.diagnosis.evidence.noise_floor import noise_floor
 from pipelines.diagnosis.evidence.observed_run import Run, observe
 from pipelines.errors import InputError
 from pipelines.estimation.angle_noise import CUTOFF_HZ, is_loud
+from pipelines.mechanics.even_grid import on_even_grid
 from pipelines.mechanics.motion import Motion
 from pipelines.mechanics.origin import giving
 from pipelines.mechanics.scale import on_one_scale
@@ -76,7 +77,11 @@ def training_data(
     refuse_unfit(motions)
     effects = known_effects(known, motions[0].machine)
     faults = tuple(find_faults(motions, accept))
-    valid = [downsampled(motion) for motion in excluding(motions, faults) if motion.valid.any()]
+    valid = [
+        downsampled(on_even_grid(motion))
+        for motion in excluding(motions, faults)
+        if motion.valid.any()
+    ]
     _refuse_missing_purpose(valid, faults)
     runs = [observe(motion) for motion in valid]
     # Training runs alone decide, as no fit may depend on validation runs.

@@ -4,16 +4,14 @@ from collections.abc import Iterator
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import minimum_filter1d
 
 from pipelines.contracts.fault_kind import FaultKind
 from pipelines.diagnosis.data_faults.fault import Fault
 from pipelines.diagnosis.data_faults.mends import mended
 from pipelines.diagnosis.data_faults.proof import Ruling, by_motion
 from pipelines.mechanics.motion import Motion
+from pipelines.signals.sampling import HORIZON, local_period, missing_samples, sample_rate
 
-HORIZON = 50
-"""Samples within which a late stamp is followed by one that is not late."""
 SINGLE = 3
 """Most missing samples in a row that count as dropped; more are a gap."""
 JITTER = 0.04
@@ -30,33 +28,33 @@ that."""
 
 def timing_faults(motion: Motion) -> Iterator[Fault]:
     """Yield the faults of the time stamps of one run."""
+    if len(motion) < 2:
+        return
     late = motion.time * motion.sample_rate_hz - np.arange(len(motion))
-    missing = _missing_samples(motion, late)
-    yield from _missing(motion, missing)
+    missing = _missing(motion)
+    yield from _lost(motion, missing)
     yield from _counter(motion)
     # Without the samples that are missing, even stamps lie on a grid of the nominal rate.
     on_grid = late - np.concatenate([[0.0], np.cumsum(missing)])
+    # A rate that changes is no jitter, so steps are compared with those around them.
+    steps = np.diff(motion.time) / local_period(motion.time) - missing
     # The difference of two independent deviations has twice their variance.
-    jitter = float(np.std(np.diff(on_grid))) / np.sqrt(2.0)
+    jitter = float(np.std(steps)) / np.sqrt(2.0)
     if jitter > JITTER:
         yield _irregular(motion, on_grid, jitter)
     yield from _rate(motion, on_grid)
 
 
-def _missing_samples(motion: Motion, late: NDArray) -> NDArray:
+def _missing(motion: Motion) -> NDArray:
     """Return how many samples are missing before each but the first, (n - 1,) whole numbers.
 
-    The counter shows them. Without one: a missing sample makes all later samples late, a late stamp
-    only itself. So the step is sought in the lower envelope of the lateness: ``late`` (n,) is the
-    time in sample periods, less the sample's number.
+    The counter shows them, or else the stamps.
     """
-    if motion.sequence is not None:
-        step = _counted(motion.sequence)
-        # A counter that jumps where time does not is a fault of its own: no sample is missing.
-        return np.where(_disagrees(motion, step), 0, np.maximum(step - 1, 0))
-    # The negative origin makes the window look ahead.
-    ahead = minimum_filter1d(late, HORIZON, origin=-(HORIZON // 2), mode="nearest")
-    return np.maximum(np.rint(np.diff(ahead)), 0.0).astype(np.int64)
+    if motion.sequence is None:
+        return missing_samples(motion.time)
+    step = _counted(motion.sequence)
+    # A counter that jumps where time does not is a fault of its own: no sample is missing.
+    return np.where(_disagrees(motion, step), 0, np.maximum(step - 1, 0))
 
 
 def _counted(sequence: NDArray) -> NDArray:
@@ -75,7 +73,7 @@ def _disagrees(motion: Motion, step: NDArray) -> NDArray:
     return np.abs(np.diff(motion.time) * motion.sample_rate_hz - step) > SINGLE
 
 
-def _missing(motion: Motion, missing: NDArray) -> Iterator[Fault]:
+def _lost(motion: Motion, missing: NDArray) -> Iterator[Fault]:
     # The missing samples are absent already, and those around them are valid.
     nothing_to_mask = np.zeros(len(motion), dtype=bool)
     long, few = missing > SINGLE, (missing > 0) & (missing <= SINGLE)
@@ -195,7 +193,7 @@ def _rate(motion: Motion, on_grid: NDArray) -> Iterator[Fault]:
     # The median ignores spans with a late stamp.
     drift = float(np.median(on_grid[HORIZON:] - on_grid[:-HORIZON])) / HORIZON
     # A rate that changes within the run differs in median and mean: that is no wrong clock.
-    overall = float(on_grid[-1] - on_grid[0]) / (len(motion) - 1)
+    overall = motion.sample_rate_hz / sample_rate(motion.time) - 1.0
     if min(abs(drift), abs(overall)) <= RATE:
         return
     fault = Fault(
