@@ -18,6 +18,7 @@ from exoid_cli.stage_runner import run_stages
 from pipelines.errors import InputError
 
 if TYPE_CHECKING:
+    from pipelines.acquisition.acquire import Outcome
     from pipelines.acquisition.progress import Progress
     from pipelines.mechanics.trajectory import Trajectory
     from pipelines.settings import Experiment
@@ -66,6 +67,8 @@ def acquire(
       exoid acquire --run with_human_train
       exoid acquire --run with_human_train --trajectory mine.toml -o a.parquet
     """
+    from pipelines.settings.rig.recording_only import is_recording_only
+
     folder = open_experiment(config)
     experiment = folder.experiment
     if run is None:
@@ -80,12 +83,60 @@ def acquire(
         run_stages(context, folder, "acquire", again=again, before=ask)
         return
     experiment.run_named(run)
+    if is_recording_only(experiment.file(experiment.acquire.rig)):
+        given = {"--trajectory": trajectory is not None, "--reset-faults": reset_faults}
+        for option in (name for name, is_given in given.items() if is_given):
+            raise InputError(
+                f"{option}: found with a rig file that is recording_only; exoid moves nothing"
+                " there, so leave it out"
+            )
+        _record_only(experiment, run, output or folder.step("acquire", run).target, overwrite)
+        return
     if trajectory is None or output is None:
         step = folder.step("acquire", run)
         trajectory, output = trajectory or step.inputs[0], output or step.target
     _record(
         experiment, run, trajectory, output, yes=yes, overwrite=overwrite, reset_faults=reset_faults
     )
+
+
+def _record_only(experiment: "Experiment", run: str, output: Path, overwrite: bool) -> None:
+    """Record a machine that its own controller moves."""
+    from pipelines.acquisition.record_only import record_only
+    from pipelines.workflow.imported import refuse_imported, refuse_recorded
+
+    def claim() -> None:
+        if not overwrite:
+            refuse_recorded(output)
+
+    refuse_imported(output)
+    claim()
+    rig = experiment.file(experiment.acquire.rig)
+    console.say(f"{rig}: recording only; exoid moves nothing, and writes nothing to any device")
+
+    def report(seconds: float, rows: int) -> None:
+        printer.print(f"{seconds:.0f} s, {rows} samples")
+
+    with BackgroundPrinter(console.say) as printer:
+        outcome = record_only(
+            rig,
+            experiment.run_named(run),
+            output,
+            experiment.acquire.sample_rate_hz,
+            experiment.mechanism,
+            report,
+            claim,
+        )
+    _say_outcome(outcome, run)
+
+
+def _say_outcome(outcome: "Outcome", run: str) -> None:
+    if outcome.missed:
+        console.warn(
+            f"{outcome.path}: {outcome.missed} samples were missed; `exoid show` lists the gaps"
+        )
+    console.emit({key: getattr(outcome, key) for key in ("path", "samples", "missed", "left_out")})
+    console.say(f"{outcome.path}: {outcome.samples} samples of run {run}, {outcome.missed} missed")
 
 
 def _record(
@@ -147,10 +198,6 @@ def _record(
             begin=begin,
             claim=claim,
         )
-    if outcome.missed:
-        console.warn(
-            f"{outcome.path}: {outcome.missed} samples were missed; `exoid show` lists the gaps"
-        )
     # Up to as many, they are those of the missed samples.
     if outcome.left_out > outcome.missed:
         console.warn(
@@ -158,8 +205,7 @@ def _record(
             f" than {1e3 / rate:g} ms or answers were lost: the leg moved unevenly there; lower"
             " acquire.sample_rate_hz"
         )
-    console.emit({key: getattr(outcome, key) for key in ("path", "samples", "missed", "left_out")})
-    console.say(f"{outcome.path}: {outcome.samples} samples of run {run}, {outcome.missed} missed")
+    _say_outcome(outcome, run)
 
 
 @contextmanager

@@ -67,14 +67,18 @@ def ask_before(experiment: "Experiment", step: "Step", *, yes: bool) -> tuple[st
     Returns the arguments that its command needs besides.
     """
     from pipelines.settings.rig import load_rig
+    from pipelines.settings.rig.recording_only import is_recording_only
 
     if step.stage != "acquire" or step.run is None:
         return ()
     if yes:
         return ("--yes",)
     run = experiment.run_named(step.run)
+    path = experiment.file(experiment.acquire.rig)
+    if is_recording_only(path):  # nothing moves by it
+        return ()
     # Before a person is moved, the command itself asks, and shows the limits.
-    if run.run == "exo_alone" and not load_rig(experiment.file(experiment.acquire.rig)).embedded:
+    if run.run == "exo_alone" and not load_rig(path).embedded:
         _require_terminal(f"run {run.name} moves the empty machine")
         _print(f"Run {run.name} moves the machine for {run.duration_s:g} s.")
         _ask("Is nobody in the machine, and the emergency stop at hand?", f"run {run.name}")

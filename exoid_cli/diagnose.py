@@ -34,6 +34,13 @@ def diagnose(
             show_default="[diagnose] known, nothing",
         ),
     ] = None,
+    accept: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="Kind of fault that does not stop the diagnosis, as clock; repeatable.",
+            show_default="[diagnose] accept, nothing",
+        ),
+    ] = None,
     figures: Annotated[
         bool, typer.Option("--figures/--no-figures", help="Whether to draw the figures.")
     ] = True,
@@ -56,16 +63,15 @@ def diagnose(
     from pipelines.diagnosis.verdict.figures import FIGURES
     from pipelines.diagnosis.verdict.verdict import verdict
     from pipelines.mechanics.read import geometry_from, read_motions, refuse_another_mechanism
-    from pipelines.settings.diagnose import DiagnoseSettings
 
-    if not files and output is None and figures and not known:
+    if not files and output is None and figures and not known and not accept:
         experiment = open_experiment(config, problem="no recording is given")
         run_stages(context, experiment, "diagnose", again=again)
         return
     files, output = inputs_and_folder("diagnose", files, output, config, "no recording is given")
     settings = settings_in_force(config)
-    if known:
-        settings = settings.model_copy(update={"diagnose": DiagnoseSettings(known=tuple(known))})
+    chosen = settings.diagnose.changed(known=known or None, accept=accept or None)
+    settings = settings.model_copy(update={"diagnose": chosen})
     tables = {"parameters": PARAMETERS, "residuals": RESIDUALS, "candidates": CANDIDATES}
     # Before the search, as its result would be lost.
     for name, contract in tables.items():
@@ -73,7 +79,7 @@ def diagnose(
     motions = read_motions(files, settings.filter, geometry_from(settings))
     refuse_another_mechanism(settings.mechanism, motions)
     with folder_to_fill(output), console.progress("diagnosing", 1.0) as report:
-        diagnosis = find(motions, report, settings.diagnose.known)
+        diagnosis = find(motions, report, chosen.known, chosen.accept)
     document = verdict(diagnosis)
     # Checked before anything is written, so that a verdict on disk is always a valid one.
     checked = check(document, str(output / "verdict.json"))

@@ -1,6 +1,8 @@
 """``exoid rig check``: compare a rig with its file."""
 
+import sys
 from dataclasses import asdict
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
@@ -48,6 +50,9 @@ def check(
         ),
     ] = False,
     yes: Annotated[bool, typer.Option("--yes", help="Move without asking, for scripts.")] = False,
+    trace: Annotated[
+        bool, typer.Option("--trace", help="Print all bytes, sent (>) and received (<), to stderr.")
+    ] = False,
 ) -> None:
     """Ask every device of a rig and say what is wrong; nothing moves without --move.
 
@@ -72,9 +77,13 @@ def check(
     console.say(f"{file}: asking every device")
     if move and not yes:
         confirm_move()
-    report = check_rig(file, rate_hz, run, OperatorPrompt() if by_hand else None, move=move)
+    operator = OperatorPrompt() if by_hand else None
+    show = partial(print, file=sys.stderr) if trace else None
+    report = check_rig(file, rate_hz, run, operator, move=move, trace=show)
     console.emit(asdict(report))
     _show(report)
+    for note in report.notes:
+        console.note(note)
     if report.findings:
         count = len(report.findings)
         console.say("\nWhat is wrong")
@@ -94,7 +103,7 @@ def _show(report: "RigReport") -> None:
     console.table(headings, rows, numbers=", ".join(headings[2:-1]))
     drives = [device for device in report.devices if "angle" in device.values]
     if drives:
-        console.say("\nDrives, disabled")
+        console.say(f"\nDrives, {'as they move' if report.recording_only else 'disabled'}")
         headings = ("", "angle rad", "rad/s", "current A", "°C", "samples/s", "clock s/s")
         console.table(headings, map(_drive, drives), numbers=", ".join(headings[1:]))
     sensors = [device for device in report.devices if "force_x" in device.values]

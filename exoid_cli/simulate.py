@@ -170,10 +170,11 @@ def _replay(table: "Table", recording: Path, settings: "Experiment", output: Pat
     from pipelines.contracts import SIMULATION, describe
     from pipelines.dynamics.plant import plant_from_table
     from pipelines.dynamics.replay import replay
+    from pipelines.mechanics.even_grid import on_even_grid
     from pipelines.mechanics.read import geometry_from, read_motion
     from pipelines.simulation import recorded
 
-    motion = read_motion(recording, settings.filter, geometry_from(settings))
+    motion = on_even_grid(read_motion(recording, settings.filter, geometry_from(settings)))
     plant = plant_from_table(table, motion.run, motion.geometry, recording)
     with console.working(f"replaying {recording.name}"):
         replayed = replay(plant.model, motion)

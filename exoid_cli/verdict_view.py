@@ -38,7 +38,10 @@ def _show_faults(verdict: "Verdict") -> None:
     """List the faults of acquisition; the summary names only the first."""
     faults = verdict.data_faults
     if verdict.acquisition_at_fault:
-        console.say("\nNo cause was sought. Correct the acquisition, and record again.")
+        console.say("\nNo cause was sought. Correct the acquisition, or accept it.")
+    else:
+        # Those with a proof are among the caveats.
+        faults = [fault for fault in faults if fault.proof is None]
     if len(faults) < 2:
         return
     console.say("\nFaults of acquisition")

@@ -40,7 +40,10 @@ class DeviceError(ExoidError):
 
 
 class Refused(DeviceError):
-    """A device refused a request."""
+    """A device refused a request, with a Modbus exception."""
+
+    code = 0
+    """Of the exception."""
 
 
 class Unanswered(DeviceError):

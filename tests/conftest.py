@@ -1,7 +1,9 @@
 """What holds for every test, and the command line for those that use it."""
 
 import os
+import shutil
 import signal
+import tempfile
 from dataclasses import dataclass
 
 # Each worker has a core; threads of BLAS, for matrices as narrow as these, would only wait for it.
@@ -11,10 +13,29 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 import pytest
 
 from exoid_cli.app import run
+from tests.once import FOLDER
 
 # A shell lets what it starts in the background ignore Ctrl-C, and so would the programs that tests
 # start and stop.
 signal.signal(signal.SIGINT, signal.default_int_handler)
+
+
+def pytest_configure(config):
+    # Workers of pytest-xdist inherit it, and have a workerinput.
+    if not hasattr(config, "workerinput"):
+        os.environ[FOLDER] = tempfile.mkdtemp(prefix="exoid-tests-")
+    # Else pytest-xdist begins with the files of most tests, and what takes longest comes last.
+    config.option.loadscopereorder = False
+
+
+def pytest_collection_modifyitems(items):
+    """Begin with the files that take long, so that both workers end at about the same time."""
+    items.sort(key=lambda item: item.get_closest_marker("long") is None)
+
+
+def pytest_unconfigure(config):
+    if not hasattr(config, "workerinput"):
+        shutil.rmtree(os.environ.pop(FOLDER))
 
 
 @dataclass(frozen=True)

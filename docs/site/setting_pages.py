@@ -12,10 +12,11 @@ from typing import get_origin
 from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
-from pipelines.settings.base import Settings, models_in
+from pipelines.settings.base import models_in
 from pipelines.settings.experiment import Experiment
 from pipelines.settings.import_map import ImportMap
 from pipelines.settings.rig import RigSettings
+from pipelines.settings.rig.recording_only import RecordingRig
 from pipelines.settings.transmission import GEARED, paths
 from pipelines.settings.units import ALIASES, UNITS
 
@@ -42,6 +43,12 @@ of your own.
 
 ## Outside of all tables
 """
+RECORDING_ONLY = """\
+## With `recording_only = true`, outside of all tables
+
+The tables below differ then; [recording-only.md](recording-only.md) explains them.
+
+"""
 HEAD = "| key | default | meaning |\n|---|---|---|\n"
 
 
@@ -64,7 +71,11 @@ def map_page() -> str:
 def rig_page() -> str:
     """Return docs/rig-keys.md."""
     own = HEAD + "\n".join(rows_of(RigSettings))
-    return _page(RIG, own, *grouped_sections(RigSettings))
+    sections = list(grouped_sections(RigSettings))
+    # Tables that both kinds of rig file have are listed once.
+    read_only = [one for one in grouped_sections(RecordingRig) if one not in sections]
+    only = RECORDING_ONLY + HEAD + "\n".join(rows_of(RecordingRig))
+    return _page(RIG, own, *sections, only, *read_only)
 
 
 PAGES = {"settings": experiment_page, "import-map": map_page, "rig-keys": rig_page}
@@ -88,8 +99,10 @@ def grouped_sections(model: type[BaseModel]) -> Iterator[str]:
     """Yield a section of Markdown for each kind of table below a model, with all its headings."""
     # Most headings of a section's title; more stand below it.
     most = 6
+    # Least number of rows that are not repeated, but named with their other table.
+    many = 10
+    above: dict[str, str] = {}
     headings: dict[type[BaseModel], dict[str, None]] = {}
-    bases: dict[type, str] = {}
     for heading, inner in sections_of(model):
         headings.setdefault(inner, {})[f"`{heading}`"] = None
     for inner, names in headings.items():
@@ -97,18 +110,14 @@ def grouped_sections(model: type[BaseModel]) -> Iterator[str]:
         if not rows:
             continue
         title, about = ", ".join(names), inner.__doc__ or ""
-        base = inner.__bases__[0]
-        # Keys that two kinds of table inherit are listed once.
-        if base in bases:
-            shared = list(rows_of(base))
-            rows = [row for row in rows if row not in shared]
-            about += (
-                f"\n\nIt also has the keys of {bases[base]} down to `{[*base.model_fields][-1]}`."
-            )
-        elif base is not Settings:
-            bases[base] = next(iter(names))
         if len(names) > most:
             title, about = inner.__name__, f"{about}\n\nTables: {title}."
+        repeated = [row for row in rows if row in above]
+        if len(repeated) >= many:
+            first, last = (row.split("|")[1].strip() for row in (repeated[0], repeated[-1]))
+            about = f"{about}\n\n{first} to {last} as of {above[repeated[0]]}; in addition:"
+            rows = [row for row in rows if row not in above]
+        above |= dict.fromkeys(rows, title.split(",")[0])
         yield f"## {title}\n\n{about}\n\n{HEAD}" + "\n".join(rows)
 
 

@@ -17,6 +17,8 @@ class RegressionFilterKeys(Keys):
     order: Annotated[int, Field(gt=0)] | None = None
     cutoff_hz: Positive | None = None
     decimation: Annotated[int, Field(gt=0)] | None = None
+    # True where steps of time vary: whoever fits puts rows on a uniform grid first.
+    over_time: bool = False
 
 
 class MotionKeys(RunKeys):

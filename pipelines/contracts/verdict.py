@@ -7,6 +7,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, ValidationError, model_validator
 
+from pipelines.contracts.fault_kind import FaultKind
 from pipelines.errors import ContractError
 from pipelines.validation.explain import explain
 
@@ -208,12 +209,29 @@ class Reversal(_Object):
     over_travel_rmse_nm: Number
 
 
+class Proof(_Object):
+    """What mending a fault changes."""
+
+    recorded: Number
+    """Share of the variance that rigid body and friction do not predict, as recorded."""
+    mended: Number
+    agreement: Number
+    """Correlation of the mended channel with its prediction."""
+    channels: int
+
+
 class Fault(_Object):
     """Something wrong with a file's data."""
 
     file: str
     channel: str
     what: str
+    kind: FaultKind | None = None
+    """Files of older versions lack it and the next two."""
+    veto: bool = False
+    """Whether it stops the diagnosis, unless its kind is accepted."""
+    proof: Proof | None = None
+    """The change of the error by mending it; None where samples are left out, or by no model."""
 
 
 class Residual(_Object):
@@ -276,6 +294,8 @@ class Verdict(_Object):
     """Files of older versions lack it."""
     causes: list[Cause]
     data_faults: list[Fault]
+    accepted: list[FaultKind] = []
+    """Kinds of faults whose veto the user overruled; files of older versions lack it."""
     residual: Residual | None
     runs: list[str]
     noise_floor_from: str

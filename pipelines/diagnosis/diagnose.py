@@ -12,6 +12,7 @@ both are repeated with causes sought on all runs.
 
 from collections.abc import Sequence
 
+from pipelines.contracts.fault_kind import FaultKind
 from pipelines.diagnosis.all_runs import by_all_runs
 from pipelines.diagnosis.candidates.library import Report, silent
 from pipelines.diagnosis.diagnosis import Diagnosis
@@ -24,7 +25,10 @@ from pipelines.mechanics.motion import Motion
 
 
 def diagnose(
-    motions: Sequence[Motion], report: Report = silent, known: Sequence[str] = ()
+    motions: Sequence[Motion],
+    report: Report = silent,
+    known: Sequence[str] = (),
+    accept: Sequence[FaultKind] = (),
 ) -> Diagnosis:
     """Find where rigid body with Coulomb and viscous friction is wrong, and the cause.
 
@@ -42,6 +46,8 @@ def diagnose(
         Takes the share that is done, 0 to 1, and the present step.
     known : sequence of str, optional
         Labels of effects that the machine is known to have besides rigid body and friction.
+    accept : sequence of FaultKind, optional
+        Kinds of faults of acquisition whose veto the user overrules.
 
     Returns
     -------
@@ -53,7 +59,7 @@ def diagnose(
         Where there is no run to train or to validate on, or an effect in ``known`` cannot be part
         of the baseline.
     """
-    data = training_data(motions, known)
+    data = training_data(motions, known, accept)
     prepared = prepare(data.train, data.baseline)
     selected = nothing_selected(prepared) if data.spoilt else select(prepared, report)
     # Position of the progress bar at which the fit begins.

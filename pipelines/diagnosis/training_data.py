@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from pipelines.contracts.fault_kind import FaultKind
 from pipelines.contracts.joints import the
 from pipelines.diagnosis.data_faults import Fault, excluding, find_faults
 from pipelines.diagnosis.evidence.baseline import Baseline, baseline_of, only_trained_outputs
@@ -15,6 +16,7 @@ from pipelines.diagnosis.evidence.noise_floor import noise_floor
 from pipelines.diagnosis.evidence.observed_run import Run, observe
 from pipelines.errors import InputError
 from pipelines.estimation.angle_noise import CUTOFF_HZ, is_loud
+from pipelines.mechanics.even_grid import on_even_grid
 from pipelines.mechanics.motion import Motion
 from pipelines.mechanics.origin import giving
 from pipelines.mechanics.scale import on_one_scale
@@ -36,8 +38,20 @@ class TrainingData:
         """Faults of acquisition that prevent any statement about physics."""
         return [fault for fault in self.faults if fault.spoils]
 
+    @property
+    def doubts(self) -> list[Fault]:
+        """Faults that the diagnosis uses as recorded: they change little, or are accepted."""
+        return [fault for fault in self.faults if fault.is_used and not fault.spoils]
 
-def training_data(motions: Sequence[Motion], known: Sequence[str] = ()) -> TrainingData:
+    @property
+    def left_out(self) -> list[Fault]:
+        """Faults whose samples, or whose cuffs, are left out."""
+        return [fault for fault in self.faults if not fault.is_used]
+
+
+def training_data(
+    motions: Sequence[Motion], known: Sequence[str] = (), accept: Sequence[FaultKind] = ()
+) -> TrainingData:
     """Prepare a session's motions.
 
     Parameters
@@ -46,6 +60,8 @@ def training_data(motions: Sequence[Motion], known: Sequence[str] = ()) -> Train
         Runs of one machine, some to train and some to validate.
     known : sequence of str
         Labels of effects that the machine is known to have besides rigid body and friction.
+    accept : sequence of FaultKind
+        Kinds of faults of acquisition whose veto the user overrules.
 
     Returns
     -------
@@ -60,9 +76,13 @@ def training_data(motions: Sequence[Motion], known: Sequence[str] = ()) -> Train
     motions = on_one_scale(motions)
     refuse_unfit(motions)
     effects = known_effects(known, motions[0].machine)
-    faults = tuple(find_faults(motions))
-    valid = [downsampled(motion) for motion in excluding(motions, faults) if motion.valid.any()]
-    _refuse_missing_purpose(valid)
+    faults = tuple(find_faults(motions, accept))
+    valid = [
+        downsampled(on_even_grid(motion))
+        for motion in excluding(motions, faults)
+        if motion.valid.any()
+    ]
+    _refuse_missing_purpose(valid, faults)
     runs = [observe(motion) for motion in valid]
     # Training runs alone decide, as no fit may depend on validation runs.
     noisy = is_loud([motion for motion in valid if motion.purpose == "train"])
@@ -85,14 +105,16 @@ def training_data(motions: Sequence[Motion], known: Sequence[str] = ()) -> Train
     )
 
 
-def _refuse_missing_purpose(motions: Sequence[Motion]) -> None:
+def _refuse_missing_purpose(motions: Sequence[Motion], faults: Sequence[Fault]) -> None:
     """Raise InputError without a training or a validation run, or with a kind to validate only."""
     listed = ", ".join(f"{m.file} ({m.run}, {m.purpose})" for m in motions) or "none"
     reasons = {"train": "the model is fitted there", "validate": "the gain is measured there"}
     for purpose, why in reasons.items():
         if not any(m.purpose == purpose for m in motions):
+            wrong = "".join(f"; {f.file}: {f.in_words}" for f in faults if f.samples is not None)
             raise InputError(
                 f"found no run to {purpose} on among: {listed}; {why}: {giving(purpose, motions)}"
+                f"{wrong}"
             )
     trained = {m.run for m in motions if m.purpose == "train"}
     strangers = [m.file for m in motions if m.purpose == "validate" and m.run not in trained]
@@ -114,7 +136,7 @@ def _refuse_unknown_noise(validate: Sequence[Run], faults: Sequence[Fault]) -> N
             usable = sum(int(run.usable[:, j].sum()) for run in validate)
             files = [run.motion.file for run in validate]
             wrong = "".join(
-                f"; {fault.file}: {fault.what}" for fault in faults if fault.file in files
+                f"; {fault.file}: {fault.in_words}" for fault in faults if fault.file in files
             )
             raise InputError(
                 f"{', '.join(files)}: {usable} blocks away from {the(joint)}'s reversals, too few"

@@ -16,6 +16,7 @@ from pipelines.importing.time import clock
 from pipelines.importing.time.clock import Run
 from pipelines.settings import transmission
 from pipelines.settings.import_map import ImportMap, ReadingSettings, TimeSettings
+from pipelines.signals.sampling import missing_samples, sample_rate
 from pipelines.validation.suggestion import suggestion
 
 
@@ -139,32 +140,52 @@ class Log:
     ) -> NDArray:
         """Return a channel with a clock of its own, interpolated linearly at a run's instants."""
         reading, of_time = channel.reading, noting("time", findings)
-        stamps = clock.stamps(self.columns[column], column, self.settings, of_time)
+        own_clock = reading.clock(self.settings)
+        where = f"{channel.where}.time: {column!r}"
+        stamps = clock.stamps(self.columns[column], column, own_clock, of_time)
         columns = {name: self.columns[name] for name in columns_of(reading, channel.where)}
         if {len(values) for values in columns.values()} - {1, len(stamps)}:
             raise InputError(f"{channel.where} and its clock {column!r} differ in length")
         note = noting(channel.target, findings)
         values = quantity(reading, channel.gain, columns, channel.target, note)
-        known = np.isfinite(values)
-        # Both clocks count from one origin, the first stamp of the log's own clock.
-        since = clock.seconds(stamps[known], self.origin, self.settings, of_time)
-        own = clock.runs(since, stamps[known], of_time)
+        if not np.isfinite(stamps).any():
+            raise InputError(f"{where} has no time stamp in any row; correct the column")
+        known = np.isfinite(values) & np.isfinite(stamps)
+        if not known.any():
+            return np.full(len(run), np.nan)
+        stamps, first = stamps[known], stamps[known][0]
+        since = clock.seconds(stamps, first, own_clock, of_time)
+        own = clock.runs(since, stamps, own_clock.count_s, of_time)
+        if not own:
+            raise InputError(f"{where} has the same time stamp in every row; correct the column")
         # Runs of two clocks cannot be matched, as neither shows which of the other it belongs to.
-        if len(own) != 1:
-            raise InputError(f"{channel.where}.time: {column!r} has {len(own)} runs, expected one")
-        time, samples = own[0].time_s + own[0].began_s, values[known][own[0].rows]
+        if len(own) > 1:
+            raise InputError(f"{where} has {len(own)} runs, expected one; cut the file there")
+        # Both clocks count from one origin, the first stamp of the log's own clock.
+        ahead_s = self._ahead(first, own_clock) + reading.time_offset_s
+        time, samples = own[0].time_s + own[0].began_s + ahead_s, values[known][own[0].rows]
         at = run.began_s + run.time_s
+        if time[-1] < at[0] or time[0] > at[-1]:
+            raise InputError(
+                f"{where} runs from {time[0]:.6g} to {time[-1]:.6g} s, the log from {at[0]:.6g} to"
+                f" {at[-1]:.6g} s; correct its time_unit, or set its time_offset_s"
+            )
         interpolated = np.interp(at, time, samples, left=np.nan, right=np.nan)
-        steps = np.diff(time)
-        gap = steps > clock.longest_step(steps)
-        before = np.clip(np.searchsorted(time, at, "right") - 1, 0, len(steps))
+        gap = missing_samples(time) > 0
+        before = np.clip(np.searchsorted(time, at, "right") - 1, 0, len(gap))
         # A sample at the edge of a gap is known, although the interval behind it is not.
         on_sample = time[before] == at
         interpolated[np.append(gap, False)[before] & ~on_sample] = np.nan
-        rate_hz = 1.0 / np.median(steps)
-        seen = f"sampled at {rate_hz:.4g} Hz by a clock of its own ({column})"
+        seen = f"sampled at {sample_rate(time):.4g} Hz by a clock of its own ({column})"
         note(seen, "interpolated linearly, not across its gaps")
         return interpolated
+
+    def _ahead(self, first: float, own: TimeSettings) -> float:
+        """Return the time from the first stamp of the log to the first of another clock, s."""
+        # Whole stamps of one unit are subtracted as integers: float64 lacks their last digits.
+        if own.count_s == self.settings.count_s:
+            return float(first - self.origin) * own.count_s
+        return float(first) * own.count_s - float(self.origin) * self.settings.count_s
 
 
 def read_log(source: Source, settings: ImportMap, map_path: Path) -> Log:
@@ -201,9 +222,11 @@ def read_log(source: Source, settings: ImportMap, map_path: Path) -> Log:
         columns = _as_numbers(columns, set(), findings)
         return Log(source, settings.time, channels, columns, 0.0, rows, (run,), findings)
     column = settings.time.column
-    clocks = {channel.time for channel in channels} | {column}
+    clocks = {channel.time for channel in channels} | {column, settings.time.plus}
     # A clock that is the same as that of the log is none of the channel's own.
-    same = {name for name in clocks if name and same_stamps(columns[name], columns[column])}
+    same = {
+        one.time for one in channels if one.time and same_stamps(columns[one.time], columns[column])
+    }
     # The map may name the clock of the log, to interpolate a channel of which rows are blank.
     channels = tuple(
         replace(one, time=None) if one.reading.time is None and one.time in same else one
@@ -211,10 +234,11 @@ def read_log(source: Source, settings: ImportMap, map_path: Path) -> Log:
     )
     _check_switches(channels, source, {column, *same})
     columns = _as_numbers(columns, clocks, findings)
-    stamps = clock.stamps(columns[column], column, settings.time, note)
+    plus = None if settings.time.plus is None else columns[settings.time.plus]
+    stamps = clock.stamps(columns[column], column, settings.time, note, plus)
     origin = clock.first_stamp(stamps)
     time_s = clock.seconds(stamps, origin, settings.time, note)
-    runs = tuple(clock.runs(time_s, stamps, note))
+    runs = tuple(clock.runs(time_s, stamps, settings.time.count_s, note))
     return Log(source, settings.time, channels, columns, origin, len(stamps), runs, findings)
 
 
@@ -264,6 +288,8 @@ def _check_switches(channels: Sequence[Channel], source: Source, same: set[str])
 def _needed(channels: tuple[Channel, ...], time: TimeSettings) -> dict[str, str]:
     """Return every column that the map names, and its first place there."""
     needed = {time.column: "time.column"} if time.column is not None else {}
+    if time.plus is not None:
+        needed.setdefault(time.plus, "time.plus")
     for channel in channels:
         for name in columns_of(channel.reading, channel.where):
             needed.setdefault(name, channel.where)

@@ -21,6 +21,7 @@ from pipelines.importing.sanity import plausibility
 from pipelines.importing.sources.joined import joined, parts_of
 from pipelines.importing.sources.open import open_source
 from pipelines.importing.sources.source import Source
+from pipelines.importing.time import held
 from pipelines.importing.time.clock import FASTEST_HZ, SLOWEST_HZ, Run, Sampling
 from pipelines.importing.time.period import repeats_after
 from pipelines.settings.import_map import ImportMap, RecordingSettings
@@ -156,9 +157,13 @@ def _recordings_of(
 ) -> Iterator[Imported]:
     path, findings = log.source.path, [*log.findings, *run.findings]
     columns = log.quantities(run, findings)
+    if settings.time.keep == "new":
+        run, columns = held.only_new(run, columns, log.required, findings)
+    else:
+        findings += held.remarks(run, {name: columns[name] for name in log.required})
     whole = _whole_rows(columns, log.required, findings)
     time = run.time_s[whole]
-    sampling = Sampling.of(run.time_s, time)
+    sampling = Sampling.of(time)
     note = noting("time", findings)
     _note_sampling(sampling, note)
     columns = {"time_s": time} | {name: values[whole] for name, values in columns.items()}
@@ -172,9 +177,8 @@ def _recordings_of(
     _check_overlap(time, wanted, spans)
     for recording, rows in zip(wanted, spans, strict=True):
         own = {name: values[rows] for name, values in columns.items()}
-        begin, end = np.searchsorted(run.time_s, own["time_s"][[0, -1]])
         # Rate and gaps of the span itself, as a logger's rate may change during a run.
-        cut = Sampling.of(run.time_s[begin : end + 1], own["time_s"])
+        cut = Sampling.of(own["time_s"])
         in_source = run.rows[whole][rows]
         imported = {
             "began_s": run.began_s,
@@ -224,7 +228,11 @@ def _note_sampling(sampling: Sampling, note: Note) -> None:
             f"irregular: {sampling.irregular:.0%} of the steps are more than 2 % off their median; "
             f"{shortest:.4g} to {longest:.4g} ms, median {median:.4g}"
         )
-        note(seen, "stamps kept as they are; exoid filter interpolates angles between them")
+        note(seen, "stamps kept as they are; later stages average over time, not over rows")
+    slow, fast = sampling.rates_hz
+    if fast > 1.5 * slow:
+        seen = f"rate changes between {fast:.4g} and {slow:.4g} Hz on the way"
+        note(seen, "kept; to use the part of one rate only, set span_s in [[recording]]")
     if sampling.gaps:
         longest_gap = max(count for _, count in sampling.gaps) / sampling.rate_hz
         seen = (

@@ -1,14 +1,15 @@
 """Compute a motion from a recording: filtered angles, derivatives, segments, valid samples."""
 
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pyarrow as pa
 from numpy.typing import NDArray
-from scipy.interpolate import CubicSpline
+from scipy.interpolate import Akima1DInterpolator, CubicSpline
 
 from pipelines.contracts.joints import Joint
 from pipelines.contracts.table import Rows, Table
@@ -74,7 +75,8 @@ class FilteredRecording:
         time, angle = _time_and_angle(rows, self.joints)
         q, dq, ddq = angle.copy(), np.zeros_like(angle), np.zeros_like(angle)
         segment, valid = np.zeros(len(time), dtype=np.int64), np.zeros(len(time), dtype=bool)
-        edge_rows = edge(rate_hz, self.cutoff.hz)
+        # Half a sample less, as times are rounded.
+        edge_s = (edge(rate_hz, self.cutoff.hz) - 0.5) / rate_hz
         # A stretch that lies only in the margin may be too short to filter; it is dropped.
         first, last = window.first + window.core.start, window.first + window.core.stop
         # One that ends at the first row, or begins at the last, does not overlap the core.
@@ -85,16 +87,15 @@ class FilteredRecording:
         for s in overlapping:
             here = _rows_of(s, self.stretches, window)
             segment[here] = s
-            if self.stretches.samples[s] < shortest(rate_hz, self.cutoff.hz):
+            if self.stretches.lasting(rate_hz)[s] < shortest(rate_hz, self.cutoff.hz):
                 continue
             grid = _Grid(self.stretches, s, rate_hz)
             q[here], dq[here], ddq[here] = grid.filtered(
                 time[here], angle[here], self.cutoff.hz, self.metadata["filter"]["order"]
             )
-            # Rows near an end of the stretch are invalid, because the filter lacks one side there.
-            begin = int(self.stretches.start[s]) + edge_rows - window.first
-            end = int(self.stretches.stop[s]) - edge_rows - window.first
-            valid[max(0, begin) : max(0, end)] = True
+            # Samples near an end of the stretch are invalid, as the filter lacks one side there.
+            begin_s, end_s = self.stretches.origin_s[s] + edge_s, self.stretches.end_s[s] - edge_s
+            valid[here] = (time[here] > begin_s) & (time[here] < end_s)
         return _motion_columns(rows, self.joints, (q, dq, ddq), segment, valid)
 
 
@@ -136,6 +137,8 @@ def filtered(recording: Rows, settings: FilterSettings) -> FilteredRecording:
         "why": cutoff.reason,
     }
     block = BlockAverage.lasting(settings.block_s, rate_hz).as_metadata(rate_hz)
+    if stretches.uneven:
+        block["over_time"] = True
     metadata = recording.metadata | {"filter": how, "regression_filter": block}
     return FilteredRecording(recording, metadata, cutoff, stretches)
 
@@ -170,22 +173,26 @@ def motion_table(recording: Table, settings: FilterSettings) -> Table:
 def _cutoff(
     recording: Rows, stretches: Stretches, rate_hz: float, settings: FilterSettings
 ) -> Cutoff:
+    # Where a rate changes, the slowest part limits the band of all.
+    slowest_hz = stretches.slowest_hz
+    if slowest_hz != rate_hz:
+        stretches = replace(stretches, uniform=np.zeros(len(stretches), dtype=bool))
     if settings.cutoff_hz == "auto":
-        samples = int(stretches.samples[stretches.longest])
-        if samples < 2 * shortest(rate_hz, rate_hz / 8):
+        samples = int(stretches.lasting(slowest_hz)[stretches.longest])
+        if samples < 2 * shortest(slowest_hz, slowest_hz / 8):
             raise InputError(
                 f"the longest stretch without a gap has {_count(samples)}, too few to choose a"
                 " cut-off from; record longer runs, or set filter.cutoff_hz"
             )
-        if not stretches.uniform[stretches.longest]:
-            # The grid has more or fewer points than there are samples, but at least half as many.
-            samples //= 2
         names = tuple(joint.name for joint in recording.joints)
-        return choose_cutoff(_on_grid(recording, stretches, rate_hz), samples, rate_hz, names)
-    if settings.cutoff_hz >= rate_hz / 2:
+        # A grid between uneven samples may have one point less.
+        samples -= not stretches.uniform[stretches.longest]
+        pieces = _on_grid(recording, stretches, slowest_hz)
+        return choose_cutoff(pieces, samples, slowest_hz, names)
+    if settings.cutoff_hz >= slowest_hz / 2:
         raise InputError(
             f"filter.cutoff_hz is {settings.cutoff_hz:g}, expected less than half the sample rate"
-            f" of {rate_hz:g} Hz; lower it"
+            f" of {slowest_hz:g} Hz; lower it"
         )
     return Cutoff(settings.cutoff_hz, "set by hand")
 
@@ -194,7 +201,7 @@ def _refuse_stretches_that_are_all_edge(
     stretches: Stretches, rate_hz: float, cutoff: Cutoff
 ) -> None:
     rows = edge(rate_hz, cutoff.hz)
-    longest = int(stretches.samples[stretches.longest])
+    longest = int(stretches.lasting(rate_hz)[stretches.longest])
     # Both edges are invalid, so that not one valid sample would remain.
     if longest <= 2 * rows or longest < shortest(rate_hz, cutoff.hz):
         raise InputError(
@@ -262,6 +269,11 @@ class _Grid:
     def __init__(self, stretches: Stretches, number: int, rate_hz: float) -> None:
         self._origin_s = stretches.origin_s[number]
         self._uniform = stretches.uniform[number]
+        # A wrong stamp makes a spline overshoot in the long step beside it, which is no noise that
+        # a low-pass averages out. Between nearly even samples a spline is more accurate.
+        self._between: Callable[[NDArray, NDArray], Any] = CubicSpline
+        if stretches.uneven:
+            self._between = partial(Akima1DInterpolator, method="makima")
         self._rate_hz = rate_hz
 
     def filtered(
@@ -287,4 +299,4 @@ class _Grid:
         first = int(np.ceil((time[0] - self._origin_s) * self._rate_hz))
         last = int((time[-1] - self._origin_s) * self._rate_hz)
         grid = self._origin_s + np.arange(first, last + 1) / self._rate_hz
-        return grid, CubicSpline(time, angle)(grid)
+        return grid, np.asarray(self._between(time, angle)(grid))

@@ -10,6 +10,13 @@ def settings_of(run: Run) -> str:
     return "the map" if "imported" in run.metadata else "the rig file"
 
 
+def mend_in(run: Run, key: str) -> str:
+    """Return how to mend a channel: the key of the map of its import, or the rig file."""
+    if "imported" in run.metadata:
+        return f"change its `{key}` in the map"
+    return "mend its register in the rig file"
+
+
 def giving(purpose: str, runs: Sequence[Run]) -> str:
     """Explain how to add a run for a purpose to a session."""
     if any("imported" in run.metadata for run in runs):

@@ -13,6 +13,7 @@ from pipelines.contracts.joint_units import Scale
 from pipelines.contracts.table import Rows, Table
 from pipelines.contracts.windows import windows
 from pipelines.errors import InputError
+from pipelines.mechanics.even_grid import on_even_grid
 from pipelines.mechanics.geometry import Geometry
 from pipelines.mechanics.machine import Machine
 from pipelines.mechanics.motion import Motion, Piece, motion_from_table
@@ -102,6 +103,9 @@ class StoredRun:
         Piece
             Of at most 65,536 rows and the margins.
         """
+        if self._even is not None:
+            yield from self._even.pieces(margin)
+            return
         # First row of the segment in which the next window begins. A filter over blocks counts them
         # from there, so that windows do not shift the blocks.
         begun = 0
@@ -114,9 +118,17 @@ class StoredRun:
             following = changes[changes <= window.first + window.core.stop - margin]
             begun = int(following[-1]) if len(following) else begun
 
+    @cached_property
+    def _even(self) -> Motion | None:
+        """The run at uniform times, all of it in memory; None where its samples are even."""
+        chosen = self.rows.metadata.get("regression_filter") or {}
+        if not chosen.get("over_time"):
+            return None
+        return self.whole()
+
     def whole(self) -> Motion:
-        """Return the whole run with every channel in memory."""
-        return self._motion(pa.concat_tables(self.rows.pieces()))
+        """Return the whole run with every channel in memory, at uniform times."""
+        return on_even_grid(self._motion(pa.concat_tables(self.rows.pieces())))
 
 
 Run = Motion | StoredRun

@@ -80,6 +80,10 @@ class Block:
             packed[place] = byte
         return list(self._words_format.unpack(packed))
 
+    def only(self, name: str) -> "Block":
+        """Return the block of one quantity."""
+        return Block({name: self.registers[name]})
+
     def span(self, name: str) -> float:
         """Return the modulus of an unsigned register.
 

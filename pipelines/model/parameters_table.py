@@ -1,6 +1,6 @@
 """Build models from ``parameters/1`` tables, and check that their rigid bodies are realizable."""
 
-import pandas as pd
+from typing import TYPE_CHECKING
 
 from pipelines.contracts.joint_units import FIRST_MOMENT
 from pipelines.effects import RUNS, Effect
@@ -10,8 +10,11 @@ from pipelines.mechanics.geometry import Geometry
 from pipelines.mechanics.machine import THE_LEG, Machine
 from pipelines.model.model import Model, Term, effect_named, term_from
 
+if TYPE_CHECKING:
+    import pandas as pd
 
-def model_from_parameters(frame: pd.DataFrame, run: str, machine: Machine = THE_LEG) -> Model:
+
+def model_from_parameters(frame: "pd.DataFrame", run: str, machine: Machine = THE_LEG) -> Model:
     """Build the model of one kind of run from a ``parameters/1`` table.
 
     Parameters
@@ -51,7 +54,9 @@ def model_from_parameters(frame: pd.DataFrame, run: str, machine: Machine = THE_
     return Model((*(_term_from_rows(effect, rows) for effect, rows in parts), *terms))
 
 
-def terms_next_to_bodies(frame: pd.DataFrame, machine: Machine) -> list[tuple[Term, pd.DataFrame]]:
+def terms_next_to_bodies(
+    frame: "pd.DataFrame", machine: Machine
+) -> "list[tuple[Term, pd.DataFrame]]":
     """Return every term of a ``parameters/1`` table except rigid bodies, with its rows.
 
     Raises
@@ -73,7 +78,7 @@ def terms_next_to_bodies(frame: pd.DataFrame, machine: Machine) -> list[tuple[Te
     return [(_term_from_rows(_effect_of_rows(rows, machine), rows), rows) for _, rows in others]
 
 
-def _effect_of_rows(rows: pd.DataFrame, machine: Machine) -> Effect:
+def _effect_of_rows(rows: "pd.DataFrame", machine: Machine) -> Effect:
     """Return the effect that some rows of a parameters table describe."""
     # A missing joint or run may be None or NaN; only a text is a name.
     first = rows.iloc[0]
@@ -89,14 +94,14 @@ def _effect_of_rows(rows: pd.DataFrame, machine: Machine) -> Effect:
     return of(joint=joint, run=run, on=machine, each_run=each_run)
 
 
-def _term_from_rows(effect: Effect, rows: pd.DataFrame) -> Term:
+def _term_from_rows(effect: Effect, rows: "pd.DataFrame") -> Term:
     try:
         return term_from(effect, dict(zip(rows["name"], rows["value"].astype(float), strict=True)))
     except InputError as error:
         raise InputError(f"the parameters table: {error}") from None
 
 
-def unrealizable(parameters: pd.DataFrame, machine: Machine, geometry: Geometry) -> list[str]:
+def unrealizable(parameters: "pd.DataFrame", machine: Machine, geometry: Geometry) -> list[str]:
     """Explain why no real machine has the rigid bodies of a ``parameters/1`` table.
 
     Parameters
@@ -121,7 +126,7 @@ def unrealizable(parameters: pd.DataFrame, machine: Machine, geometry: Geometry)
     ]
 
 
-def upside_down(parameters: pd.DataFrame, machine: Machine) -> list[str]:
+def upside_down(parameters: "pd.DataFrame", machine: Machine) -> list[str]:
     """Report first moments of mass that lie above their axes.
 
     Angles count from hanging straight down. A link may be overbalanced, or stand up. Otherwise its

@@ -15,13 +15,14 @@ from pipelines.rig.clocks import OwnClock
 from pipelines.rig.plant import JOINTS, Samples
 from pipelines.rig.ring import Ring
 from pipelines.rig.servo import Servo
-from pipelines.settings.rig.block import registers_of
+from pipelines.settings.rig.block import ReadBlock, registers_of
 from pipelines.settings.rig.devices import DriveSettings, SensorSettings
 from pipelines.settings.rig.register_map import DriveMap, Identity, SensorMap
 
 if TYPE_CHECKING:
     from pipelines.rig.virtual_rig import VirtualRig
 
+READ_HOLDING, WRITE_MULTIPLE = 3, 16
 READ_WRITE = 23
 """Function code of the exchange that ends a cycle in lockstep."""
 
@@ -33,10 +34,18 @@ class Device(ABC):
     """Records of earlier samples, of a drive that keeps them."""
 
     def __init__(
-        self, rig: "VirtualRig", unit: int, identity: Iterable[Identity], blocks: Iterable[Block]
+        self,
+        rig: "VirtualRig",
+        unit: int,
+        identity: Iterable[Identity],
+        blocks: Iterable[Block],
+        read: ReadBlock,
     ) -> None:
         self.rig = rig
         self.unit = unit
+        self.functions: set[int] = {read.function}
+        """Function codes that it knows."""
+        self._most_words = read.most_words
         self.identity = tuple(identity)
         self.blocks = tuple(blocks)
         self.registers: list[int] = []
@@ -74,6 +83,10 @@ class Device(ABC):
         written: list | None,
     ) -> ExcCodes | None:
         self.registers, self.first = registers, first
+        if function not in self.functions:
+            return ExcCodes.ILLEGAL_FUNCTION
+        if written is None and count > self._most_words:
+            return ExcCodes.ILLEGAL_VALUE
         if written is not None and not self.takes(address, count):
             return ExcCodes.ILLEGAL_ADDRESS
         self.rig.catch_up()  # with the old set-point, before a write takes effect
@@ -114,7 +127,12 @@ class Drive(Device):
         self.read = Block(registers_of(registers.read))
         self.write = Block(registers_of(registers.write))
         self.ring = Ring(registers.ring) if registers.ring else None
-        super().__init__(rig, settings.unit, registers.identity, (self.read, self.write))
+        blocks = (self.read, self.write)
+        super().__init__(rig, settings.unit, registers.identity, blocks, registers.read)
+        # Without FC23 it takes set-points by the other function alone.
+        self.functions |= {READ_HOLDING, registers.write.function}
+        if registers.write.function == READ_WRITE:
+            self.functions |= {WRITE_MULTIPLE}
         self.joint = JOINTS.index(settings.joint)
         self.torque_per_ampere = settings.torque_per_ampere
         self.servo = servo
@@ -191,7 +209,7 @@ class Sensor(Device):
 
     def __init__(self, rig: "VirtualRig", settings: SensorSettings, registers: SensorMap) -> None:
         self.read = Block(registers_of(registers.read))
-        super().__init__(rig, settings.unit, registers.identity, (self.read,))
+        super().__init__(rig, settings.unit, registers.identity, (self.read,), registers.read)
         self.cuff = CUFFS.index(settings.cuff)
 
     def show(self, sample: Samples) -> None:

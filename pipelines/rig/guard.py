@@ -1,5 +1,6 @@
 """Protection of a virtual rig against hostile or faulty clients."""
 
+from collections.abc import Collection, Mapping
 from typing import TypeVar
 
 from pymodbus.constants import ExcCodes
@@ -10,17 +11,24 @@ from pymodbus.server.requesthandler import ServerRequestHandler
 Server = TypeVar("Server", bound=ModbusBaseServer)
 
 
+Functions = Mapping[int, Collection[int]]
+"""Function codes that each unit knows."""
+
+
 class NoRequest(ModbusPDU):
     """A frame that is no valid request; it gets the exception reply of the specification."""
 
-    def __init__(self, function: int) -> None:
+    def __init__(self, function: int, functions: Functions) -> None:
         super().__init__()
+        self._functions = functions
         # Bit 7 marks an exception reply, which pymodbus sets in the reply itself.
         self.function_code = function & 0x7F
 
     async def datastore_update(self, context: object, device_id: int) -> ModbusPDU:
-        """Refuse the request."""
-        return ExceptionResponse(self.function_code, ExcCodes.ILLEGAL_VALUE)
+        """Refuse the request: for its function, which comes first, or for its content."""
+        known = self._functions.get(device_id, (self.function_code,))
+        code = ExcCodes.ILLEGAL_VALUE if self.function_code in known else ExcCodes.ILLEGAL_FUNCTION
+        return ExceptionResponse(self.function_code, code)
 
 
 class Handler(ServerRequestHandler):
@@ -58,12 +66,12 @@ class Handler(ServerRequestHandler):
             )
 
 
-def guarded(server: Server) -> Server:
+def guarded(server: Server, functions: Functions) -> Server:
     """Return a server that no client can stop or let grow without bounds."""
     # Where this is None, pymodbus replies to function 0, and drops all bytes that came with the
     # frame.
     decode = server.decoder.decode
-    server.decoder.decode = lambda frame: decode(frame) or NoRequest(frame[0])  # type: ignore[method-assign]
+    server.decoder.decode = lambda frame: decode(frame) or NoRequest(frame[0], functions)  # type: ignore[method-assign]
     connection = (server.trace_packet, server.trace_pdu, server.trace_connect)
     server.callback_new_connection = lambda: Handler(server, *connection)  # type: ignore[method-assign]
     return server

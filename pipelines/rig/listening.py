@@ -13,7 +13,7 @@ from pymodbus.server import ModbusSerialServer, ModbusTcpServer, ModbusTlsServer
 from pymodbus.simulator import SimDevice
 
 from pipelines.errors import DeviceError, SettingsError
-from pipelines.rig.guard import guarded
+from pipelines.rig.guard import Functions, guarded
 from pipelines.rig.null_modem import null_modem
 from pipelines.settings.rig.line import (
     LineSettings,
@@ -27,7 +27,10 @@ from pipelines.settings.rig.line import (
 
 @asynccontextmanager
 async def listening(
-    line: LineSettings, devices: list[SimDevice], requests: Sequence[type[ModbusPDU]] = ()
+    line: LineSettings,
+    devices: list[SimDevice],
+    requests: Sequence[type[ModbusPDU]] = (),
+    functions: Functions | None = None,
 ) -> AsyncIterator[str]:
     """Serve devices on a line for the duration of the block; yield the address for clients.
 
@@ -40,6 +43,8 @@ async def listening(
     devices : list of SimDevice
     requests : sequence of ModbusPDU types
         Requests that replace those of pymodbus.
+    functions : mapping, optional
+        Function codes that each unit knows; by default all.
 
     Raises
     ------
@@ -53,11 +58,11 @@ async def listening(
             bus = ModbusSerialServer(
                 devices, port=ours, baudrate=line.baud_rate, ignore_missing_devices=True
             )
-            async with _serving(bus, place, requests):
+            async with _serving(bus, place, requests, functions or {}):
                 yield place
         return
     server = _network_server(line, devices)
-    async with _serving(server, line.place, requests):
+    async with _serving(server, line.place, requests, functions or {}):
         # For port 0 the system has chosen the number, which clients need.
         number = cast(asyncio.Server, server.transport).sockets[0].getsockname()[1]
         yield f"{line.host}:{number}"
@@ -80,12 +85,15 @@ def _network_server(line: NetworkLine, devices: list[SimDevice]) -> ModbusTcpSer
 
 @asynccontextmanager
 async def _serving(
-    server: ModbusTcpServer | ModbusSerialServer, place: str, requests: Sequence[type[ModbusPDU]]
+    server: ModbusTcpServer | ModbusSerialServer,
+    place: str,
+    requests: Sequence[type[ModbusPDU]],
+    functions: Functions,
 ) -> AsyncIterator[None]:
     for request in requests:
         server.decoder.register(request)
     try:
-        if not await guarded(server).listen():
+        if not await guarded(server, functions).listen():
             raise DeviceError(f"{place}: cannot listen there; choose another --port or --bind")
         yield
     finally:

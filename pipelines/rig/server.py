@@ -64,6 +64,7 @@ async def serve(
     virtual = VirtualRig(rig, plant, sample_rate_hz)
     on_line: dict[str | int, list[SimDevice]] = defaultdict(list)
     queues: dict[str | int, dict[int, Callable]] = defaultdict(dict)
+    functions: dict[str | int, dict[int, set[int]]] = defaultdict(dict)
     for settings, device in zip(
         (*rig.drive, *rig.sensor), (*virtual.drives, *virtual.sensors), strict=True
     ):
@@ -71,6 +72,7 @@ async def serve(
         own_port = settings.port if port is None else port
         key = own_port if settings.line is None else settings.line
         on_line[key].append(device.as_served())
+        functions[key][device.unit] = device.functions
         if isinstance(device, Drive):
             queues[key][device.unit] = device.queue
     if port and len(on_line) > 1:
@@ -93,7 +95,9 @@ async def serve(
                     if isinstance(key, str)
                     else (None, TcpLine.model_construct(port=key))
                 )
-                served = listening(_placed(line, bind, port), devices, [fifo_request(queues[key])])
+                served = listening(
+                    _placed(line, bind, port), devices, [fifo_request(queues[key])], functions[key]
+                )
                 announce(await servers.enter_async_context(served), name)
             await until.wait()
     finally:

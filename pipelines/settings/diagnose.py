@@ -1,7 +1,8 @@
-"""``[diagnose]``: effects of the machine that are known before a diagnosis."""
+"""``[diagnose]``: what is known of the machine and its recordings before a diagnosis."""
 
 from pydantic import Field
 
+from pipelines.contracts.fault_kind import FaultKind
 from pipelines.settings.base import Settings
 
 
@@ -10,4 +11,8 @@ class DiagnoseSettings(Settings):
 
     known: tuple[str, ...] = Field(
         (), description="Effects known to be present, as `rotor_inertia@knee`, with fitted size."
+    )
+    accept: tuple[FaultKind, ...] = Field(
+        (),
+        description="Kinds of faults of acquisition that do not stop the diagnosis, as `clock`.",
     )

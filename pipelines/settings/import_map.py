@@ -4,7 +4,7 @@ import re
 from collections.abc import Iterator
 from fnmatch import fnmatch
 from pathlib import Path
-from typing import Annotated, Literal, Self
+from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, field_validator, model_validator
 
@@ -70,13 +70,30 @@ class TimeSettings(Settings):
     """The clock."""
 
     column: str | None = Field(None, description="The column with the time stamps.")
-    unit: str = Field("s", description="s, ms, us, ns, min, or iso8601 for dates written out.")
+    unit: str = Field(
+        "s",
+        description="Of the stamps, after `scale`: s, ms, us, 100ns, ns, min, h or d, or iso8601"
+        " for dates written out.",
+    )
+    scale: Factor = Field(
+        1.0, description="Stamps are multiplied by it first: 0.1 with ms for ticks of 0.1 ms."
+    )
+    format: str | None = Field(
+        None, description='How dates are written, such as "%d/%m/%Y %I:%M:%S.%f %p".'
+    )
+    plus: str | None = Field(
+        None, description="Column that is added: nanoseconds of a second, or the time of a date."
+    )
+    plus_unit: str = Field("ns", description="Unit of `plus`, if it has numbers.")
     wraps_at: Positive | None = Field(
         None, description="Reading at which the clock wraps around to 0, such as 4294967296."
     )
     rate_hz: Positive | None = Field(None, description="In place of a column: rows a second.")
     restarts: Literal["longest", "split"] = Field(
         "longest", description="Where the clock starts over: keep the longest run, or split there."
+    )
+    keep: Literal["all", "new"] = Field(
+        "all", description='"new" leaves out rows that only repeat the values before.'
     )
 
     @model_validator(mode="after")
@@ -85,8 +102,28 @@ class TimeSettings(Settings):
             raise ValueError(
                 "expected either column or rate_hz (rows a second, where no clock was logged)"
             )
-        _refuse_other_units(self.unit, ["time"])
+        for unit in (self.unit, self.plus_unit):
+            _refuse_other_units(unit, ["time"])
+        if self.format is not None and not self.is_written:
+            raise ValueError(f'format: needs unit = "iso8601", found {self.unit!r}')
+        if self.scale != 1.0 and self.is_written:
+            raise ValueError("scale: dates have none; remove it")
+        if self.plus is not None and (self.column is None or self.wraps_at is not None):
+            raise ValueError("plus: needs column, and no wraps_at; remove one of them")
         return self
+
+    @property
+    def is_written(self) -> bool:
+        """Whether the stamps are dates or times of day in text."""
+        return self.unit == "iso8601"
+
+    @property
+    def count_s(self) -> float:
+        """Duration of a count of the stamps, s."""
+        whole = self.plus is None or self.is_written
+        unit = unit_named(self.unit if whole else self.plus_unit)
+        assert unit is not None, "the map checks its units"
+        return unit.factor * self.scale if whole else unit.factor
 
 
 class ReadingSettings(Settings):
@@ -116,6 +153,11 @@ class ReadingSettings(Settings):
     )
     range: tuple[float, float] | None = Field(None, description="Lowest and highest raw reading.")
     time: str | None = Field(None, description="Column with this channel's own time stamps.")
+    time_unit: str | None = Field(None, description="Their unit, if it is not that of [time].")
+    time_scale: Factor | None = Field(None, description="Their scale, if it is not that of [time].")
+    time_offset_s: Bounded = Field(
+        0.0, description="Added to this clock, if it does not begin with that of [time]."
+    )
 
     @model_validator(mode="after")
     def _is_one_reading(self) -> Self:
@@ -131,7 +173,18 @@ class ReadingSettings(Settings):
             raise ValueError("expected either signed_bits or sign_bit, one of them")
         if self.begins_at is not None and self.wraps_at is None:
             raise ValueError("begins_at: needs wraps_at; set wraps_at, or remove it")
+        if self.time_unit is not None:
+            _refuse_other_units(self.time_unit, ["time"])
         return self
+
+    def clock(self, of_log: TimeSettings) -> TimeSettings:
+        """Return the settings of this channel's own clock; what it does not set, the log's has."""
+        own: dict[str, Any] = {"column": self.time, "plus": None}
+        if self.time_unit is not None or self.time_scale is not None:
+            # Another unit comes with another counter.
+            own |= {"unit": self.time_unit or of_log.unit, "scale": self.time_scale or 1.0}
+            own |= {"wraps_at": None, "format": None}
+        return of_log.model_copy(update=own)
 
     @property
     def known_unit(self) -> Unit:
@@ -315,8 +368,8 @@ class ImportMap(Settings):
             raise ValueError(
                 f"force: found {target} twice, expected each axis of a cuff once; remove one"
             )
-        if self.source.join is not None and self.time.column is None:
-            raise ValueError("source.join: needs time.column, the clock that each file has")
+        if self.source.join is not None and (self.time.column is None or self.time.plus):
+            raise ValueError("source.join: needs time.column alone, the clock that each file has")
         owners: dict[str, str] = {}
         for place, reading in self.readings():
             if reading.time is not None and self.time.column is None:

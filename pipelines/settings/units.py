@@ -18,8 +18,11 @@ UNITS: dict[str, Unit] = {
     "s": Unit("time", 1.0),
     "ms": Unit("time", 1e-3),
     "us": Unit("time", 1e-6),
+    "100ns": Unit("time", 1e-7),
     "ns": Unit("time", 1e-9),
     "min": Unit("time", 60.0),
+    "h": Unit("time", 3600.0),
+    "d": Unit("time", 86400.0),
     # Dates are read as whole nanoseconds.
     "iso8601": Unit("time", 1e-9),
     "rad": Unit("angle", 1.0),

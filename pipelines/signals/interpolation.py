@@ -4,7 +4,6 @@ from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.interpolate import Akima1DInterpolator
 
 Place = TypeVar("Place", float, NDArray[np.float64])
 
@@ -45,6 +44,8 @@ def between_readings(x: NDArray, longest: int) -> NDArray:
     (n, k) array
         Interpolated values; ``x`` itself if it has fewer than two readings, or one at every sample.
     """
+    from scipy.interpolate import Akima1DInterpolator
+
     read = np.flatnonzero(np.isfinite(x).all(axis=1))
     if len(read) in (0, 1, len(x)):
         return x

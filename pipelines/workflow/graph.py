@@ -12,6 +12,7 @@ from typing import Any
 from pipelines.settings.acquire import RunSettings
 from pipelines.settings.experiment import Experiment
 from pipelines.settings.rig import load_rig
+from pipelines.settings.rig.recording_only import is_recording_only
 from pipelines.workflow.imported import ImportedRuns
 
 STAGES = (
@@ -183,15 +184,19 @@ def _recorded(
         "acquire": {"sample_rate_hz": experiment.acquire.sample_rate_hz},
         "run": run.model_dump(mode="json"),
     }
-    words = ("acquire", *config_option, "--run", run.name, "--trajectory", excitation.as_posix())
-    command = (*words, "-o", target.as_posix())
-    inputs, sealed = (excitation, rig), sealed_file(rig)
+    words = ("acquire", *config_option, "--run", run.name)
+    inputs: tuple[Path, ...] = (rig,)
+    # A machine that its own controller moves follows no excitation of exoid's.
+    if not is_recording_only(rig):
+        words = (*words, "--trajectory", excitation.as_posix())
+        inputs = (excitation, rig)
+    command, sealed = (*words, "-o", target.as_posix()), sealed_file(rig)
     return Step("acquire", target, inputs, counted, command, run=run.name, watched=sealed)
 
 
 def sealed_file(rig: Path) -> Path | None:
     """Return the sealed file of a virtual rig, if it exists."""
-    plant = load_rig(rig).plant if rig.is_file() else None
+    plant = load_rig(rig).plant if rig.is_file() and not is_recording_only(rig) else None
     sealed = rig.parent / plant.sealed if plant and plant.sealed else None
     return sealed if sealed and sealed.is_file() else None
 

@@ -13,6 +13,7 @@ from pipelines.contracts.atomic import write_text
 from pipelines.contracts.provenance import sha256
 from pipelines.settings.experiment import Experiment
 from pipelines.settings.rig import load_rig
+from pipelines.settings.rig.recording_only import is_recording_only
 from pipelines.workflow.graph import Step, graph, sealed_file
 from pipelines.workflow.imported import with_imported
 
@@ -43,7 +44,10 @@ def split(experiment: Experiment, folder: Path) -> None:
 
 def _may_run_in_parallel(experiment: Experiment) -> bool:
     """Return whether other steps may run during a recording, each run on a rig of its own."""
-    rig = load_rig(experiment.file(experiment.acquire.rig))
+    path = experiment.file(experiment.acquire.rig)
+    if is_recording_only(path):
+        return False
+    rig = load_rig(path)
     # In lockstep no time passes while the computer does something else.
     return rig.embedded and rig.clock == "lockstep"
 

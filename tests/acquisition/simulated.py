@@ -420,7 +420,7 @@ def _patched(simulated, time, run, plan, own):
     async def connect(line):
         pass
 
-    async def check_identity(device, identity):
+    async def check_identity(device, identity, function):
         pass
 
     async def keeps_any_rate(machine, cycle_hz):
@@ -434,7 +434,7 @@ def _patched(simulated, time, run, plan, own):
 
     safety = simulated.rig.safety
 
-    async def read(device, address, count, *, in_motion=False):
+    async def read(device, address, count, *, function=3, in_motion=False):
         return await ask(
             device,
             None,
@@ -442,7 +442,7 @@ def _patched(simulated, time, run, plan, own):
             safety.longest_reply_s if in_motion else safety.connect_s,
         )
 
-    async def write(device, block, words, *, in_motion=False):
+    async def write(device, block, words, *, function=16, in_motion=False):
         await ask(
             device, (block, words), None, safety.longest_reply_s if in_motion else safety.watchdog_s
         )

@@ -20,6 +20,8 @@ from pipelines.settings import datasets
 from tests.acquisition.conftest import free_port
 from tests.acquisition.journals import read_journal
 
+pytestmark = pytest.mark.long
+
 SLOW_HZ = 50.0
 """Of runs in real time: four times as long for a cycle as by default, for a busy computer."""
 

@@ -15,6 +15,8 @@ from exoid_cli.app import run
 from pipelines.contracts import MOTION, PARAMETERS
 from pipelines.settings.rig import load_rig
 
+pytestmark = pytest.mark.long
+
 CHANGES = {
     # Not seconds: a busy machine would find another motion.
     "iterations = 800 ": "iterations = 50 ",
@@ -24,6 +26,7 @@ CHANGES = {
     "duration_s = 40.0\n": "duration_s = 15.0\n",
     "\nsample_rate_hz = 200.0\n": "\nsample_rate_hz = 100.0\n",
     "figures = true": "figures = false",
+    "150.0, 200.0, 250.0, 300.0, 350.0, 400.0, 450.0, 500.0]": "150.0]",
 }
 OTHER_GAIN = ("feedback_gain_nm_s_rad = 300.0", "feedback_gain_nm_s_rad = 200.0")
 RUNS = [

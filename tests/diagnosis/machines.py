@@ -6,6 +6,7 @@ from scipy.integrate import solve_ivp
 from scipy.signal import lfilter
 
 from pipelines.contracts.table import Table
+from tests.once import once
 
 RATE_HZ, PERIOD_S = 250.0, 5.0
 
@@ -72,6 +73,7 @@ def table(time, position, torque, joint, purpose, **geometry):
     return Table(frame, metadata, None)
 
 
+@once
 def pendulum(purpose, seed, spring=0.0, asymmetry=0.0, seconds=25.0):
     """A small servo: 0.5 kg at 0.25 m, 30 g·m², with a spring of so many N·m/rad about 0.3 rad.
 
@@ -90,6 +92,7 @@ def pendulum(purpose, seed, spring=0.0, asymmetry=0.0, seconds=25.0):
     )
 
 
+@once
 def slide(purpose, seed, asymmetry=0.0, seconds=25.0):
     """A ball screw: 90 kg, 200 N·s/m and so much more of it forwards than backwards, 20 N of dry
     friction."""
@@ -104,6 +107,7 @@ def slide(purpose, seed, asymmetry=0.0, seconds=25.0):
     return table(time, x, force + noise, {"name": "axis", "kind": "prismatic"}, purpose)
 
 
+@once
 def lift(purpose, seed, spring=0.0, seconds=25.0):
     """A lift of 12 kg without a counterweight, with a spring of so many N/m about 0.02 m."""
     reference, rate = excitation(seed, 0.03)

@@ -1,10 +1,13 @@
 """Sessions for the tests of the diagnosis: the embedded plant, recorded alone and with a wearer."""
 
+import copyreg
 from dataclasses import replace
 
 import numpy as np
 
 from pipelines.contracts.table import Table
+from pipelines.diagnosis.diagnose import diagnose
+from pipelines.diagnosis.evidence.decision_regression import DecisionRegression
 from pipelines.mechanics.fourier import FourierTrajectory
 from pipelines.mechanics.kinematics import motion_table
 from pipelines.mechanics.motion import motion_from_table
@@ -13,6 +16,7 @@ from pipelines.rig.plant import Plant
 from pipelines.rig.record import record
 from pipelines.settings.filter import FilterSettings
 from pipelines.settings.rig.plant import PlantSettings
+from tests.once import once
 
 RICH = FourierTrajectory(
     theta0=np.array([0.65, -0.93]),
@@ -26,6 +30,7 @@ RUNS = [(run, purpose) for run in ("exo_alone", "with_human") for purpose in ("t
 SLOW = replace(RICH, omega=0.5 * RICH.omega)
 
 
+@once
 def recordings(effect=None, joint=None, seed=1, seconds=20.0, trained=RICH, **values):
     """Return four recordings of a leg with an effect hidden in it; the training runs follow
     ``trained``."""
@@ -49,6 +54,7 @@ def banded(motions):
     return pulled
 
 
+@once
 def session(*args, **values):
     """Return the motions of these recordings, files named by their place."""
     motions = [
@@ -56,3 +62,19 @@ def session(*args, **values):
         for table in recordings(*args, **values)
     ]
     return [replace(m, file=f"run_{i}.parquet") for i, m in enumerate(motions)]
+
+
+@once
+def diagnosed(*args, **values):
+    """Return the diagnosis of such a session."""
+    return diagnose(session(*args, **values))
+
+
+def _without_factorisation(regression):
+    """Reduce a regression to what can be stored; the factorisation is computed again where it is
+    used."""
+    state = {name: value for name, value in vars(regression).items() if name != "_coloured"}
+    return object.__new__, (DecisionRegression,), state
+
+
+copyreg.pickle(DecisionRegression, _without_factorisation)

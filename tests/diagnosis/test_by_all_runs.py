@@ -18,8 +18,10 @@ from pipelines.diagnosis.verdict import unexplained as module_of_unexplained
 from pipelines.diagnosis.verdict.error_budget import _mean_square, shares_of_causes
 from pipelines.diagnosis.verdict.verdict import verdict
 from tests.diagnosis.naming import naming
-from tests.diagnosis.sessions import RICH, session
+from tests.diagnosis.sessions import RICH, diagnosed, session
 from tests.diagnosis.test_diagnose import labels
+
+pytestmark = pytest.mark.long
 
 POOR = replace(RICH, a=0.3 * RICH.a, b=0.3 * RICH.b)
 """So slow that a drag with the speed squared is a tenth of what it is on the validation runs."""
@@ -30,7 +32,7 @@ SLOWEST = replace(RICH, a=0.15 * RICH.a, b=0.15 * RICH.b)
 
 @pytest.fixture(scope="module")
 def diagnosis():
-    return diagnose(session("quadratic_drag", "hip", seed=7, seconds=40.0, trained=POOR, drag=6.0))
+    return diagnosed("quadratic_drag", "hip", seed=7, seconds=40.0, trained=POOR, drag=6.0)
 
 
 def test_a_drag_that_slow_training_runs_do_not_show_is_named_by_all_runs(diagnosis):
@@ -192,5 +194,6 @@ def test_a_payload_that_only_a_validation_run_carries_is_named():
 
 
 def test_what_the_training_runs_show_is_sought_on_them():
-    outcome = verdict(diagnose(session("torque_gain", "hip", seed=3, gain=1.08)))
+    spring = dict(stiffness=6.0, rest_angle=-0.5)
+    outcome = verdict(diagnosed("parallel_spring", "knee", seed=4, **spring))
     assert (outcome["status"], outcome["sought_on"]) == ("explained", "train")

@@ -8,7 +8,6 @@ import pytest
 
 from pipelines.contracts import HIP_AND_KNEE
 from pipelines.diagnosis.data_faults import Fault
-from pipelines.diagnosis.diagnose import diagnose
 from pipelines.diagnosis.verdict.control_benefit import control
 from pipelines.dynamics.plant import make_plant
 from pipelines.dynamics.tracking import track
@@ -20,16 +19,14 @@ from pipelines.model import Model, Term
 from pipelines.settings.rig.plant import PlantSettings
 from pipelines.settings.simulate import SimulateSettings
 from tests.diagnosis.naming import missing, naming
-from tests.diagnosis.sessions import session
+from tests.diagnosis.sessions import diagnosed
 
-SPRING = {"stiffness": 12.0, "rest_angle": -0.5}
+SPRING = {"stiffness": 6.0, "rest_angle": -0.5}
 
 
 @pytest.fixture(scope="module")
 def sprung():
-    return naming(
-        diagnose(session("parallel_spring", "knee", seed=4, **SPRING)), "parallel_spring@knee"
-    )
+    return naming(diagnosed("parallel_spring", "knee", seed=4, **SPRING), "parallel_spring@knee")
 
 
 def true_loop():

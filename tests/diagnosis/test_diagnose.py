@@ -10,7 +10,9 @@ from pipelines.diagnosis.diagnose import diagnose
 from pipelines.diagnosis.verdict.candidate_table import candidates
 from pipelines.diagnosis.verdict.verdict import verdict
 from pipelines.errors import InputError
-from tests.diagnosis.sessions import SLOW, recordings, session
+from tests.diagnosis.sessions import SLOW, diagnosed, recordings, session
+
+pytestmark = pytest.mark.long
 
 
 def labels(cause):
@@ -20,7 +22,7 @@ def labels(cause):
 
 @pytest.fixture(scope="module")
 def faultless():
-    return diagnose(session())
+    return diagnosed(seconds=40.0)
 
 
 def test_where_nothing_is_hidden_nothing_is_missing(faultless):
@@ -70,7 +72,7 @@ def test_the_floor_is_the_noise_that_was_put_in(faultless):
 def test_a_hidden_effect_is_named_with_its_size_and_the_error_falls_to_the_floor(
     effect, joint, values, parameter
 ):
-    diagnosis = diagnose(session(effect, joint, seed=3, **values))
+    diagnosis = diagnosed(effect, joint, seed=3, **values)
     outcome = verdict(diagnosis)
     assert outcome["status"] == "explained"
     first = outcome["causes"][0]
@@ -113,7 +115,7 @@ def test_a_drag_that_slow_training_hardly_shows_is_found_among_laws_of_its_joint
 def test_what_no_data_of_a_kind_can_part_is_said_to_be_one_or_the_other(
     effect, joint, values, tied
 ):
-    first = verdict(diagnose(session(effect, joint, seed=5, **values)))["causes"][0]
+    first = verdict(diagnosed(effect, joint, seed=5, **values))["causes"][0]
     assert {(effect, joint), tied} <= labels(first)
     for tie in first["indistinguishable_from"]:
         assert tie["why"]
@@ -151,7 +153,7 @@ def test_the_tables_keep_their_contracts(faultless):
 
 def test_without_a_run_to_validate_on_no_gain_can_be_measured():
     with pytest.raises(InputError, match="found no run to validate on among: run_0"):
-        diagnose([m for m in session(seed=9) if m.purpose == "train"])
+        diagnose([m for m in session(seconds=40.0) if m.purpose == "train"])
 
 
 def test_the_command_writes_verdict_and_tables(tmp_path, capsys):

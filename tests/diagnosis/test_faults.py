@@ -11,7 +11,7 @@ import pytest
 
 from pipelines.contracts.table import Table
 from pipelines.diagnosis.data_faults import excluding, find_faults
-from pipelines.diagnosis.data_faults.nonnegative_leg import averages
+from pipelines.diagnosis.data_faults.rigid_fit import averages
 from pipelines.mechanics.fourier import FourierTrajectory
 from pipelines.mechanics.kinematics import motion_table
 from pipelines.mechanics.mechanisms.leg import LEG
@@ -154,7 +154,7 @@ def test_stamps_that_are_wrong_by_less_than_the_angles_noise_spoil_nothing(sessi
     late = frame["time_s"] + np.minimum(rng.exponential(4e-4, len(frame)), 4.5e-3)
     session[SPOILED] = frame.assign(**shaken, time_s=late), metadata
     fault = next(f for f in faults_of(session) if f.channel == "time_s")
-    assert "of the angles' own noise at most" in fault.what and not fault.spoils
+    assert "only the stamps are wrong" in fault.what and not fault.spoils
 
 
 def test_samples_taken_unevenly_under_even_stamps_are_jitter(session):
@@ -378,7 +378,7 @@ def test_cuffs_that_all_say_the_same_all_along_are_named_and_left_out(session):
     frame[forces] = 0.0
     fault = only_fault(session)
     assert "all twelve cuff forces" in fault.what and not fault.spoils
-    motions = [motion(*recorded, f"run_{k}") for k, recorded in enumerate(session)]
+    motions = [motion(*run, f"{kind}.parquet") for run, kind in zip(session, KINDS, strict=True)]
     alone, with_human = excluding(motions, [fault])
     assert with_human.forces is None and alone.forces is motions[0].forces
 

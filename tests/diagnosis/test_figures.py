@@ -20,8 +20,11 @@ from pipelines.diagnosis.verdict.verdict import verdict
 from pipelines.dynamics.replay import replay
 from pipelines.errors import InputError
 from pipelines.signals.binned_mean import binned_mean
+from tests.diagnosis import sessions
 from tests.diagnosis.naming import naming
 from tests.diagnosis.sessions import session
+
+pytestmark = pytest.mark.long
 
 
 def humming(motion):
@@ -34,16 +37,15 @@ def humming(motion):
     return replace(motion, torque=motion.torque + extra)
 
 
-SESSIONS = {
-    "explained": lambda: session("parallel_spring", "knee", seed=4, stiffness=6.0, rest_angle=-0.5),
-    "one kind, no periods": lambda: [
-        replace(m, period_s=None)
-        for m in session("parallel_spring", "knee", seed=4, stiffness=6.0, rest_angle=-0.5)
-        if m.run == "exo_alone"
-    ],
-    "unknown": lambda: [humming(m) for m in session(seed=7, seconds=40.0)],
-    "spoilt": lambda: [replace(m, torque=m.torque * [1.0, -1.0]) for m in session(seed=8)],
-    "nothing": lambda: session(seconds=40.0),
+SPRING = dict(effect="parallel_spring", joint="knee", seed=4, stiffness=6.0, rest_angle=-0.5)
+DIAGNOSES = {
+    "explained": lambda: sessions.diagnosed(**SPRING),
+    "one kind, no periods": lambda: diagnose(
+        [replace(m, period_s=None) for m in session(**SPRING) if m.run == "exo_alone"]
+    ),
+    "unknown": lambda: diagnose([humming(m) for m in session(seed=7, seconds=40.0)]),
+    "spoilt": lambda: diagnose([replace(m, torque=m.torque * [1.0, -1.0]) for m in session()]),
+    "nothing": lambda: sessions.diagnosed(seconds=40.0),
 }
 NAMED = dict.fromkeys(("explained", "one kind, no periods"), "parallel_spring@knee")
 """What is named in some of them, whatever may be tied with it."""
@@ -51,12 +53,12 @@ NAMED = dict.fromkeys(("explained", "one kind, no periods"), "parallel_spring@kn
 
 @pytest.fixture(scope="module")
 def diagnosed():
-    """Return a diagnosis by its name in ``MADE``, and what is said of it, each made once."""
+    """Return a diagnosis by its name in ``DIAGNOSES``, and its verdict, each computed once."""
     results = {}
 
     def of(name):
         if name not in results:
-            diagnosis = diagnose(SESSIONS[name]())
+            diagnosis = DIAGNOSES[name]()
             diagnosis = naming(diagnosis, NAMED[name]) if name in NAMED else diagnosis
             results[name] = diagnosis, Verdict.model_validate(verdict(diagnosis))
         return results[name]
@@ -70,7 +72,7 @@ def no_figure_stays():
     plt.close("all")
 
 
-@pytest.mark.parametrize("name", SESSIONS)
+@pytest.mark.parametrize("name", DIAGNOSES)
 def test_the_shares_of_the_error_add_up_to_the_baselines_mean_square(diagnosed, name):
     _, outcome = diagnosed(name)
     for joint, shares in outcome.error_budget.items():
@@ -106,7 +108,7 @@ def test_without_periods_no_share_claims_to_repeat(diagnosed):
 
 
 def test_what_repeats_is_no_scatter_and_what_wanders_is():
-    run = observe(session(seed=2, seconds=40.0)[1])
+    run = observe(session(seconds=40.0)[1])
     rng = np.random.default_rng(0)
     noise = 0.3 * rng.normal(size=(len(run.time), 4))
     repeats = 2.0 * np.sin(2 * np.pi * 3 * run.time / run.motion.period_s)[:, np.newaxis]
@@ -127,7 +129,7 @@ def test_two_causes_that_overlap_share_what_either_would_take():
     np.testing.assert_allclose([shares["a"], shares["b"]], [[4.5], [3.5]])
 
 
-@pytest.mark.parametrize("name", SESSIONS)
+@pytest.mark.parametrize("name", DIAGNOSES)
 def test_every_figure_is_drawn_whatever_the_verdict(diagnosed, name, tmp_path):
     drawing.draw(*diagnosed(name), tmp_path)
     written = {path.name: path.read_bytes()[:4] for path in tmp_path.iterdir()}

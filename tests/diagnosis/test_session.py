@@ -6,10 +6,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pipelines.diagnosis.data_faults import excluding, find_faults
+from pipelines.diagnosis.data_faults import find_faults
 from pipelines.diagnosis.detectability.detectability import detectability_of_recorded
 from pipelines.diagnosis.diagnose import diagnose
 from pipelines.diagnosis.evidence.eligibility import refuse_unfit
+from pipelines.diagnosis.training_data import training_data
 from pipelines.errors import InputError
 from pipelines.estimation.regression import away_from_reversals
 from pipelines.mechanics.kinematics import motion_table
@@ -209,12 +210,15 @@ def test_a_run_thinned_out_on_purpose_has_no_gaps(motions):
     assert find_faults([replace(motions[0], **thin, temperature=None, sample_rate_hz=100.0)]) == []
 
 
-def test_where_a_fault_leaves_nothing_of_a_run_masking_does_not_help(motions):
+def test_where_a_fault_leaves_nothing_of_the_only_run_the_message_names_it(motions):
     torque = motions[0].torque.copy()
     torque[:, 1] = 3.0
-    (fault,) = find_faults([replace(motions[0], torque=torque)])
-    assert "stuck" in fault.what and fault.samples is None
-    assert excluding(motions[:1], [fault])[0].valid.any()
+    stuck = replace(motions[0], torque=torque)
+    (fault,) = find_faults([stuck])
+    # No sample can judge it.
+    assert "stuck" in fault.what and fault.proof is None
+    with pytest.raises(InputError, match="torque is stuck"):
+        training_data([stuck])
 
 
 def test_a_run_that_a_fault_leaves_nothing_of_is_left_out_where_others_suffice(motions):

@@ -38,6 +38,8 @@ from tests.estimation import pendulum
 from tests.identification.conftest import RICH
 from tests.identification.test_two_step import with_noise
 
+pytestmark = pytest.mark.long
+
 HIDDEN = (
     PlantEffect(effect="coulomb_asymmetry", joint="hip", values={"asymmetry": 0.8}),
     PlantEffect(
@@ -55,7 +57,7 @@ CUFFS = Extension((Term(CuffCompliance("knee"), np.array([120.0])),))
 LABELS = ("coulomb_asymmetry@hip", "parallel_spring@knee", "rotor_inertia@knee")
 
 
-def session(effects, seconds=40.0, **settings):
+def session(effects, seconds=20.0, **settings):
     """Four runs of a leg without torque noise."""
     plant = PlantSettings(ripple_nm=(0.0, 0.0), effects=effects, **settings)
     motions = []

@@ -14,6 +14,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from pipelines.contracts import PARAMETERS, RECORDING
+from tests.conftest import Outcome
 from tests.diagnosis.machines import PERIOD_S, RATE_HZ, excitation
 
 ROOT = Path(__file__).parents[2]
@@ -22,11 +23,20 @@ ROOT = Path(__file__).parents[2]
 )
 """A reader copies what the page shows."""
 WITH_FOLDER = """
-import sys
+import io, json, sys
+from contextlib import redirect_stderr, redirect_stdout
 from pipelines.mechanics import mechanisms
 mechanisms.__path__.append(sys.argv[1])
 from exoid_cli.app import run
-sys.exit(run(sys.argv[2:]))
+
+pytestmark = pytest.mark.long
+outcomes = []
+for words in json.loads(sys.argv[2]):
+    out, err = io.StringIO(), io.StringIO()
+    with redirect_stdout(out), redirect_stderr(err):
+        code = run(words)
+    outcomes.append([code, out.getvalue(), err.getvalue()])
+print(json.dumps(outcomes))
 """
 NAMED = """
 [mechanism]
@@ -53,6 +63,14 @@ def stage(purpose, seed, asymmetry=0.0, seconds=25.0):
         )
         return kp * (wanted - x) + kd * (rate - v)
 
+    # Unknown: both accelerations along the slides, and the force across that keeps the upper
+    # body on its slide.
+    across = np.array([-along[1][1], along[1][0]])
+    lower = [LOWER_KG, 0.0, across[0]]
+    upper = UPPER_KG * np.outer(along[0], [1, 0, 0]) + UPPER_KG * np.outer(along[1], [0, 1, 0])
+    upper -= np.outer(across, [0, 0, 1])
+    by_known = np.linalg.inv(np.vstack([lower, upper]))
+
     def rates(t, s):
         x, v = s[:2], s[2:]
         push = (
@@ -61,19 +79,13 @@ def stage(purpose, seed, asymmetry=0.0, seconds=25.0):
             - 200.0 * v
             - [0.0, 0.5 * asymmetry * abs(v[1])]
         )
-        # Unknown: both accelerations along the slides, and the force across that keeps the upper
-        # body on its slide.
-        across = np.array([-along[1][1], along[1][0]])
-        lower = [LOWER_KG, 0.0, across[0]]
-        upper = UPPER_KG * np.outer(along[0], [1, 0, 0]) + UPPER_KG * np.outer(along[1], [0, 1, 0])
-        upper -= np.outer(across, [0, 0, 1])
         known = [push[0] - push[1] * along[1][0], *(push[1] * along[1])]
-        return np.append(v, np.linalg.solve(np.vstack([lower, upper]), known)[:2])
+        return np.append(v, (by_known @ known)[:2])
 
     time = np.arange(0.0, seconds, 1.0 / RATE_HZ)
     begin = [reference[k](0.0)[0] for k in range(2) for reference in references]
     path = solve_ivp(
-        rates, (0, seconds), begin, t_eval=time, rtol=1e-5, atol=1e-7, max_step=0.01
+        rates, (0, seconds), begin, "RK23", time, rtol=1e-5, atol=1e-7, max_step=0.01
     ).y.T
     force = np.array([drives(t, s[:2], s[2:]) for t, s in zip(time, path, strict=True)])
     force += np.random.default_rng(seed).normal(0, 0.5, force.shape)
@@ -104,39 +116,58 @@ def recordings(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def exoid_with_it(tmp_path_factory):
-    """Run one command line where the page's file, and what else is given, stands beside exoid's own
-    mechanisms."""
+    """Run command lines, one after the other in one process, where the page's file, and what else
+    is given, stands beside exoid's own mechanisms."""
 
-    def run(*arguments, **others):
-        folder = tmp_path_factory.mktemp("mechanisms") if others else known
+    def run(*lines, **others):
+        folder = tmp_path_factory.mktemp("mechanisms")
         for name, text in {"stage": STAGE, **others}.items():
             (folder / f"{name}.py").write_text(text, encoding="utf-8")
-        command = [sys.executable, "-c", WITH_FOLDER, folder, *arguments]
-        return subprocess.run(
-            [str(word) for word in command],
+        words = json.dumps([[str(word) for word in line] for line in lines])
+        done = subprocess.run(
+            [sys.executable, "-c", WITH_FOLDER, str(folder), words],
             capture_output=True,
             text=True,
-            check=False,
             cwd=tmp_path_factory.mktemp("elsewhere"),
             env=os.environ | {"PYTHONPATH": str(ROOT), "COLUMNS": "80"},
         )
+        assert done.returncode == 0, done.stderr
+        return [Outcome(*one) for one in json.loads(done.stdout)]
 
-    known = tmp_path_factory.mktemp("mechanisms")
     return run
 
 
 @pytest.fixture(scope="module")
-def identified(exoid_with_it, recordings, tmp_path_factory):
-    folder = tmp_path_factory.mktemp("identified")
+def folder(tmp_path_factory):
+    """Return where all that exoid makes of the recordings is."""
+    return tmp_path_factory.mktemp("made")
+
+
+@pytest.fixture(scope="module")
+def outcomes(exoid_with_it, recordings, folder):
+    """Return what came of each command, by its first word or by the format it exports to."""
     (folder / "exoid.toml").write_text(NAMED, encoding="utf-8")
-    files = [recordings / f"{purpose}.parquet" for purpose in ("train", "validate")]
-    done = exoid_with_it("identify", *files, "--config", folder / "exoid.toml", "-o", folder)
-    assert done.returncode == 0, done.stderr
-    return folder / "parameters.parquet"
+    plain, asymmetric = (
+        [recordings / f"{kind}{purpose}.parquet" for purpose in ("train", "validate")]
+        for kind in ("", "asymmetric_")
+    )
+    model = folder / "parameters.parquet"
+    lines = {
+        "identify": ["identify", *plain, "--config", folder / "exoid.toml", "-o", folder],
+        "diagnose": ["diagnose", *asymmetric, "-o", folder / "diagnosed", "--no-figures"],
+        "simulate": [
+            *("simulate", model, "--replay", plain[1]),
+            *("-o", folder / "replay.parquet", "--json"),
+        ],
+        "c": ["export", model, "--to", "c", "-o", folder / "stage.c"],
+        "urdf": ["export", model, "--to", "urdf", "-o", folder / "stage.urdf"],
+    }
+    return dict(zip(lines, exoid_with_it(*lines.values()), strict=True))
 
 
-def test_its_parameters_are_recovered_from_a_machine_that_newton_moved(identified):
-    table = PARAMETERS.read(identified)
+def test_its_parameters_are_recovered_from_a_machine_that_newton_moved(outcomes, folder):
+    assert outcomes["identify"].code == 0, outcomes["identify"].err
+    table = PARAMETERS.read(folder / "parameters.parquet")
     assert table.metadata["mechanism"] == "stage"
     assert "thigh_length_m" not in table.metadata["geometry"]
     expected = [LOWER_KG + UPPER_KG, UPPER_KG, UPPER_KG * np.cos(ANGLE), 20.0, 200.0, 20.0, 200.0]
@@ -144,11 +175,9 @@ def test_its_parameters_are_recovered_from_a_machine_that_newton_moved(identifie
     assert list(table.frame["unit"]) == ["kg", "kg", "kg", "N", "N·s/m", "N", "N·s/m"]
 
 
-def test_what_is_hidden_in_it_is_named(exoid_with_it, recordings, tmp_path):
-    files = [recordings / f"asymmetric_{purpose}.parquet" for purpose in ("train", "validate")]
-    done = exoid_with_it("diagnose", *files, "-o", tmp_path, "--no-figures")
-    assert done.returncode == 0, done.stderr
-    verdict = json.loads((tmp_path / "verdict.json").read_text(encoding="utf-8"))
+def test_what_is_hidden_in_it_is_named(outcomes, folder):
+    assert outcomes["diagnose"].code == 0, outcomes["diagnose"].err
+    verdict = json.loads((folder / "diagnosed" / "verdict.json").read_text(encoding="utf-8"))
     (cause,) = verdict["causes"]
     assert (cause["effect"], cause["joint"], verdict["status"]) == (
         "viscous_asymmetry",
@@ -158,32 +187,21 @@ def test_what_is_hidden_in_it_is_named(exoid_with_it, recordings, tmp_path):
     assert cause["parameters"][0]["value"] == pytest.approx(75.0, rel=0.03)
 
 
-def test_it_moves_as_it_was_recorded(exoid_with_it, recordings, identified, tmp_path):
-    replayed = tmp_path / "replay.parquet"
-    done = exoid_with_it(
-        "simulate",
-        identified,
-        "--replay",
-        recordings / "validate.parquet",
-        "-o",
-        replayed,
-        "--json",
-    )
-    assert done.returncode == 0, done.stderr
-    assert max(json.loads(done.stdout)["simulation_rmse_rad"].values()) < 0.0005
+def test_it_moves_as_it_was_recorded(outcomes):
+    assert outcomes["simulate"].code == 0, outcomes["simulate"].err
+    assert max(json.loads(outcomes["simulate"].out)["simulation_rmse_rad"].values()) < 0.0005
 
 
-def test_it_is_exported_where_no_bodies_are_asked_for(exoid_with_it, identified, tmp_path):
-    done = exoid_with_it("export", identified, "--to", "c", "-o", tmp_path / "stage.c")
-    assert done.returncode == 0, done.stderr
-    assert "rigid_body_X3 * at->ddq[1]" in (tmp_path / "stage.c").read_text(encoding="utf-8")
-    done = exoid_with_it("export", identified, "--to", "urdf", "-o", tmp_path / "stage.urdf")
-    assert (done.returncode, done.stderr.count("\n")) == (2, 1)
+def test_it_is_exported_where_no_bodies_are_asked_for(outcomes, folder):
+    assert outcomes["c"].code == 0, outcomes["c"].err
+    assert "rigid_body_X3 * at->ddq[1]" in (folder / "stage.c").read_text(encoding="utf-8")
+    refused = outcomes["urdf"]
+    assert (refused.code, refused.err.count("\n")) == (2, 1)
     assert (
         "stage (two level prismatic joints, the second carried by the first) has no rule for"
-        in done.stderr
+        in refused.err
     )
-    assert not (tmp_path / "stage.urdf").exists()
+    assert not (folder / "stage.urdf").exists()
 
 
 def test_without_its_file_it_is_refused_with_what_there_is(
@@ -216,8 +234,9 @@ def test_two_mechanisms_with_equal_joints_and_gravity_are_refused(
     other = STAGE.replace('name="stage"', 'name="table"').replace(
         "has_gravity=None", "has_gravity=True"
     )
-    done = exoid_with_it("identify", recordings / "train.parquet", "-o", tmp_path, table=other)
-    assert (done.returncode, done.stderr.count("\n")) == (2, 1)
-    assert done.stderr.startswith(
+    line = ["identify", recordings / "train.parquet", "-o", tmp_path]
+    (done,) = exoid_with_it(line, table=other)
+    assert (done.code, done.err.count("\n")) == (2, 1)
+    assert done.err.startswith(
         "exoid: two mechanisms have the joints prismatic, prismatic: stage (two level "
     )

@@ -22,7 +22,7 @@ def talk():
             device = SimDevice(
                 1, simdata=[SimData(0, values=[0] * 100, datatype=DataType.REGISTERS)]
             )
-            server = guarded(ModbusTcpServer([device], address=("127.0.0.1", 0)))
+            server = guarded(ModbusTcpServer([device], address=("127.0.0.1", 0)), {})
             assert await server.listen()
             line = socket.socket()
             line.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 1)

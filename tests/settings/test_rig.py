@@ -39,7 +39,7 @@ def test_a_virtual_rig_knows_its_geometry_and_its_loops():
             "gear_rato = 100.0",
             "drive[0].gear_rato: unknown key; did you mean gear_ratio? (and 1 more)",
         ),
-        ("unit = 2", "unit = 400", "drive[1].unit: found 400, expected less than or equal to 247"),
+        ("unit = 2", "unit = 400", "drive[1].unit: found 400, expected less than or equal to 255"),
         ("unit = 2", "unit = 1", "unit: two devices have 127.0.0.1:502 unit 1; correct one"),
         (
             'map = "servo"',
@@ -65,8 +65,8 @@ def test_a_virtual_rig_knows_its_geometry_and_its_loops():
             "address = 113",
             "address = 400",
             (
-                "map.drive.servo: read: spans 301 registers (100 to 400), expected at most "
-                "125, the most that one Modbus exchange carries"
+                "map.drive.servo: write.function: found 23, which reads one request, but read"
+                " takes 2; set write.function = 16"
             ),
         ),
         (
@@ -74,7 +74,8 @@ def test_a_virtual_rig_knows_its_geometry_and_its_loops():
             "control = { address = 204",
             (
                 "map.drive.servo: write: register 202 between 200 and 204 has no name,"
-                " expected a block without gaps, as it is written as a whole"
+                " expected a block without gaps; set write.function = 16, which writes its"
+                " parts one after another"
             ),
         ),
         (

@@ -91,6 +91,7 @@ def _check_counter(
             yield probe.finding(
                 f"its counter goes up by {clock.step:g} at a time, expected 1 for each sample;"
                 f" correct {where}.scale, or let the device count samples",
+                "sequence",
             )
         return
     mended = remedy(
@@ -101,7 +102,8 @@ def _check_counter(
     otherwise = f"is it sampling? Set its rate or acquire.sample_rate_hz, or correct {where}"
     yield probe.finding(
         f"its counter goes up by {measured:.4g} a second, from {counter[0]:.6g} to"
-        f" {counter[-1]:.6g}, expected {expected}; {mended or otherwise}"
+        f" {counter[-1]:.6g}, expected {expected}; {mended or otherwise}",
+        "sequence",
     )
 
 
@@ -125,12 +127,14 @@ def _check_time(probe: Probe, series: Series, clock: Clock, seconds: float) -> I
     measured = f"its clock goes on by {rate:.4g} s in each second {reference}"
     for unit in DIMENSION["time"]:
         if rate and abs(rate * UNITS[unit] / UNITS[register.unit] - 1.0) <= RATE_TOLERANCE:
-            yield probe.finding(f'{measured}; with unit = "{unit}" the two agree: correct {where}')
+            yield probe.finding(
+                f'{measured}; with unit = "{unit}" the two agree: correct {where}', "time"
+            )
             return
     mended = remedy("time", " s", where, series, lambda v: _keeps_time(v, seconds), counts=True)
     scale = f"{register.scale / rate:.3g} would agree" if rate > 0 else "no scale would agree"
     otherwise = f"compare {where} with the manual: scale = {scale}"
-    yield probe.finding(f"{measured}; {mended or otherwise}")
+    yield probe.finding(f"{measured}; {mended or otherwise}", "time")
 
 
 def _keeps_time(time: NDArray, seconds: float) -> bool:

@@ -12,6 +12,7 @@ from pipelines.acquisition.check.probe import Probe, Series
 from pipelines.acquisition.machine.drive import Drive
 from pipelines.settings.rig import RigSettings
 from pipelines.settings.rig.devices import DriveSettings
+from pipelines.settings.rig.recording_only import RecordingRig
 
 TINY, HUGE = 1e-20, 1e20
 """Range of credible magnitudes; other floats are misread words."""
@@ -74,7 +75,9 @@ class Expectation:
             return bool((np.abs(np.diff(values)) > longest).any())
 
 
-def check_registers(probe: Probe, series: Series, rig: RigSettings) -> Iterator[Finding]:
+def check_registers(
+    probe: Probe, series: Series, rig: RigSettings | RecordingRig
+) -> Iterator[Finding]:
     """Yield findings about all registers except counter and clock.
 
     Parameters
@@ -94,11 +97,37 @@ def check_registers(probe: Probe, series: Series, rig: RigSettings) -> Iterator[
     if isinstance(probe.part, Drive):
         yield from _check_faults(probe, probe.part, series)
         expected = _of_drive(probe.part.settings, probe.in_lockstep)
-    else:
+    elif isinstance(rig, RigSettings):
         expected = _of_sensor(rig)
+    else:  # a machine that moves by itself may be anywhere
+        expected = {}
+    yield from _check_counter_words(probe, series)
     for name in series.block.names:
         if name not in ("sequence", "time", "status"):
             yield from _check_register(probe, name, series, expected.get(name, Expectation()))
+
+
+def _check_counter_words(probe: Probe, series: Series) -> Iterator[Finding]:
+    """Yield a finding for each long value whose low word is the sample counter.
+
+    Its high word alone gives a value nearly right, so only this shows that its address is wrong.
+    """
+    # New samples, each with the counter's step in the low word, that are no accident.
+    enough = 20
+    fresh = series.fresh
+    if len(fresh) < enough or "sequence" not in series.block.names:
+        return
+    steps = np.diff(series.of("sequence")[fresh]) % 65536
+    for name, register in series.block.registers.items():
+        if name in ("sequence", "time") or register.registers == 1:
+            continue
+        low = series.raw(name)[fresh, -1 if register.word_order == "big" else 0]
+        if (np.diff(low) % 65536 == steps).all():
+            yield probe.finding(
+                f"{name} has the sample counter as its low word; its address or word_order is"
+                f" wrong, compare {probe.map_path}.read.{name} with the manual",
+                name,
+            )
 
 
 def has_plausible_size(values: NDArray) -> NDArray:

@@ -1,7 +1,9 @@
 """One device under check, whose answers are kept as raw words."""
 
 import time
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,10 +11,15 @@ from numpy.typing import NDArray
 from pipelines.acquisition.check.finding import Finding
 from pipelines.acquisition.machine.drive import Drive
 from pipelines.acquisition.machine.force_sensor import Sensor
+from pipelines.acquisition.machine.read_only import ReadOnlyPart
+from pipelines.acquisition.modbus.blocks import BlockReader
 from pipelines.acquisition.modbus.wraparound import Unwrapper
 from pipelines.modbus.register_block import Block
 from pipelines.settings.rig import Register
-from pipelines.settings.rig.block import registers_of
+from pipelines.settings.rig.devices import SensorSettings
+
+Answer = tuple[float, float, list[int]]
+"""When it was asked and answered (host's clock, s), and the words."""
 
 
 @dataclass(frozen=True)
@@ -26,6 +33,37 @@ class Series:
     """(n,) s."""
     words: NDArray
     """(n, registers of the block)."""
+
+    @classmethod
+    async def read(cls, reader: BlockReader, seconds: float) -> Self:
+        """Read a block again and again.
+
+        Parameters
+        ----------
+        reader : BlockReader
+            Of the block.
+        seconds : float
+            For how long.
+
+        Raises
+        ------
+        DeviceError
+            The device did not answer, or refused.
+        """
+        answers: list[Answer] = []
+        until = time.perf_counter() + seconds
+        while not answers or time.perf_counter() < until:
+            asked = time.perf_counter()
+            words = await reader.read()
+            answers.append((asked, time.perf_counter(), words))
+        return cls.of_answers(reader.block, answers)
+
+    @classmethod
+    def of_answers(cls, block: Block, answers: Sequence[Answer]) -> Self:
+        """Return answers as a series."""
+        asked, answered, words = zip(*answers, strict=True) if answers else ((), (), ())
+        shaped = np.array(words, dtype=np.int64).reshape(len(answers), block.count)
+        return cls(block, np.array(asked), np.array(answered), shaped)
 
     def of(
         self,
@@ -68,6 +106,8 @@ class Series:
     @property
     def fresh(self) -> NDArray:
         """Indices of the first answer with each new sample, (k,)."""
+        if "sequence" not in self.block.names:
+            return np.arange(len(self.asked))
         is_new = (np.diff(self.raw("sequence"), axis=0) != 0).any(axis=1)
         return np.flatnonzero(np.r_[True, is_new])
 
@@ -81,22 +121,23 @@ class Series:
 class Probe:
     """A drive or sensor of the rig, with its recent answers."""
 
-    def __init__(self, part: Drive | Sensor, in_lockstep: bool) -> None:
+    def __init__(self, part: Drive | Sensor | ReadOnlyPart, in_lockstep: bool) -> None:
         self.part = part
-        self.is_drive = isinstance(part, Drive)
+        self.is_drive = not isinstance(part.settings, SensorSettings)
         self.in_lockstep = in_lockstep
-        self.block = Block(registers_of(part.map.read))
+        self.block = part.reader.block
+        settings = part.settings
         kind, place = (
-            ("drive", part.settings.joint)
-            if isinstance(part, Drive)
-            else ("sensor", part.settings.cuff)
+            ("sensor", settings.cuff)
+            if isinstance(settings, SensorSettings)
+            else ("drive", settings.joint)
         )
         self.name = f"{kind} {place}"
         self.place: str = place
         self.map_path = f"map.{kind}.{part.settings.map}"
         self.every = part.settings.every if isinstance(part, Sensor) else 1
         """Cycles of a run from one reading to the next."""
-        self._answers: list[tuple[float, float, list[int]]] = []
+        self._answers: list[Answer] = []
         self._last = [0] * self.block.count
 
     def finding(self, text: str, quantity: str = "") -> Finding:
@@ -105,12 +146,12 @@ class Probe:
 
     def is_due(self, cycle: int) -> bool:
         """Return whether a run reads the device in a cycle."""
-        return isinstance(self.part, Drive) or self.part.is_due(cycle)
+        return not isinstance(self.part, Sensor) or self.part.is_due(cycle)
 
     async def read(self) -> None:
         """Read the block and keep the answer."""
         asked = time.perf_counter()
-        self._keep(asked, await self.part.device.read(self.block.address, self.block.count))
+        self._keep(asked, await self.part.reader.read())
 
     async def step(self) -> None:
         """Advance a disabled drive in lockstep to its next sample; read any other device."""
@@ -127,7 +168,9 @@ class Probe:
     async def count(self) -> None:
         """Read the sample counter alone, as a run does before each sample."""
         counter = self.block.registers["sequence"]
-        await self.part.device.read(counter.address, counter.registers)
+        await self.part.device.read(
+            counter.address, counter.registers, function=self.part.reader.function
+        )
 
     def last(self) -> dict[str, float]:
         """Return the last answer's values, SI units."""
@@ -142,9 +185,7 @@ class Probe:
             n answers; none where there was none.
         """
         answers, self._answers = self._answers, []
-        asked, answered, words = zip(*answers, strict=True) if answers else ((), (), ())
-        shaped = np.array(words, dtype=np.int64).reshape(len(answers), self.block.count)
-        return Series(self.block, np.array(asked), np.array(answered), shaped)
+        return Series.of_answers(self.block, answers)
 
     def _keep(self, asked: float, words: list[int]) -> None:
         self._answers.append((asked, time.perf_counter(), words))

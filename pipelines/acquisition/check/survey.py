@@ -1,11 +1,14 @@
 """The comparison of a rig with its file by reading every device, without moving anything."""
 
 import asyncio
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
+from pymodbus.constants import ExcCodes
 
+from pipelines.acquisition.check.absent import explain_absence, explain_identity
+from pipelines.acquisition.check.addresses import in_words, moved_blocks, read_moved
 from pipelines.acquisition.check.by_drives import Answer
 from pipelines.acquisition.check.clock import Clock, check_clock, check_latch, measure_clock
 from pipelines.acquisition.check.finding import Finding
@@ -13,21 +16,28 @@ from pipelines.acquisition.check.latency import Latency
 from pipelines.acquisition.check.plausible import check_registers
 from pipelines.acquisition.check.probe import Probe, Series
 from pipelines.acquisition.check.rate import Rate, check_rate, cycles
+from pipelines.acquisition.check.refusals import explain_refusal, lacks_exchange
 from pipelines.acquisition.check.rings import check_rings
 from pipelines.acquisition.check.velocity import check_velocity
 from pipelines.acquisition.check.zeros import check_zeros
 from pipelines.acquisition.machine.drive import Drive
 from pipelines.acquisition.machine.force_sensor import Sensor
 from pipelines.acquisition.machine.machine import Machine
+from pipelines.acquisition.machine.read_only import ReadOnlyMachine, ReadOnlyPart
 from pipelines.acquisition.modbus.line import Line
+from pipelines.acquisition.modbus.one_client import greet
 from pipelines.acquisition.modbus.wraparound import RATE_TOLERANCE
 from pipelines.acquisition.pacing import SLOW
-from pipelines.errors import DeviceError
+from pipelines.errors import DeviceError, Refused
 from pipelines.settings.rig import RigSettings
+from pipelines.settings.rig.recording_only import RecordingRig
 
+Rig = RigSettings | RecordingRig
 TOGETHER_S = 2.0
 DRIVES_S = 1.0
 """Durations of cycles with all devices, and with the drives alone."""
+MOVED_S = 0.6
+"""How long a block is read at other addresses."""
 
 
 @dataclass
@@ -53,6 +63,8 @@ class RigReport:
 
     rate_hz: float | None
     """The rate of the experiment."""
+    recording_only: bool = False
+    """Whether exoid only reads the machine."""
     by_hand: bool = False
     """Whether a person moved the leg."""
     moved: list[Answer] = field(default_factory=list)
@@ -61,6 +73,8 @@ class RigReport:
     together: Rate | None = None
     drives_alone: Rate | None = None
     findings: list[Finding] = field(default_factory=list)
+    notes: list[str] = field(default_factory=list)
+    """What lines do that others do not; it is no fault."""
 
 
 def probes_of(machine: Machine) -> list[Probe]:
@@ -95,9 +109,9 @@ async def survey(machine: Machine, rate_hz: float | None, *, is_empty: bool) -> 
         if probe.part.device.line in lost:
             continue
         try:
-            await _measure_device(probe, device)
+            await _measure_device(probe, device, list(present))
         except DeviceError as error:
-            finding = _finding_of(error, [probe])
+            finding = await _explain(probe, error, device, probes, machine.rig, rate_hz)
             if finding not in report.findings:  # a lost line gives one error for all its devices
                 report.findings.append(finding)
         else:
@@ -108,18 +122,64 @@ async def survey(machine: Machine, rate_hz: float | None, *, is_empty: bool) -> 
     if len(present) == len(report.devices) or machine.rig.clock == "real_time":
         report.findings += await _measure_cycles(list(present), report)
     for probe, (device, still) in present.items():
-        report.findings += _check_device(
+        report.findings += _check_speed(probe, device, rate_hz)
+        findings = _check_device(
             probe, device, still, probe.take(), machine.rig, rate_hz, is_empty=is_empty
         )
+        report.findings += await _with_likelier(probe, findings, machine.rig, rate_hz)
+    report.notes = _notes(probes)
     report.findings += _check_rates_equal([device for device, _ in present.values()])
     if machine.rig.sampling == "recorder" and not report.findings:
         report.findings += await check_rings(machine, list(present), rate_hz)
     return report
 
 
+async def survey_read_only(
+    machine: ReadOnlyMachine, rig: RecordingRig, rate_hz: float | None
+) -> RigReport:
+    """Read every device of a machine that exoid only reads, and check the answers."""
+    report, answered = RigReport(rate_hz, recording_only=True), list[Probe]()
+    probes = [Probe(part, False) for part in machine.parts]
+    for probe in probes:
+        device = DeviceReport(probe.name, probe.part.device.label)
+        report.devices.append(device)
+        try:
+            await _measure_device(probe, device, answered)
+        except DeviceError as error:
+            report.findings.append(await _explain(probe, error, device, probes, rig, rate_hz))
+            continue
+        answered.append(probe)
+        series = probe.take()
+        device.latency = Latency.of(series.answered - series.asked)
+        findings = list(check_registers(probe, series, rig))
+        if "sequence" in series.block.names:
+            seconds = float(series.answered[-1] - series.answered[0])
+            device.clock = measure_clock(probe, series, seconds)
+            findings += check_clock(probe, series, device.clock, seconds, rate_hz)
+            findings += check_latch(probe, series)
+        report.findings += [
+            *_check_speed(probe, device, rate_hz),
+            *await _with_likelier(probe, findings, rig, rate_hz),
+        ]
+        for name in series.block.names:
+            values = series.of(name)
+            device.values[name], device.noise[name] = float(np.mean(values)), float(np.std(values))
+    report.notes = _notes(probes)
+    return report
+
+
+def _notes(probes: Sequence[Probe]) -> list[str]:
+    """Return what lines do that others do not."""
+    notes = (note for probe in probes for note in probe.part.device.line.peculiarities)
+    return list(dict.fromkeys(notes))
+
+
 async def _connect(probes: Sequence[Probe]) -> dict[Line, DeviceError]:
     """Open all lines at once, since failures take time; return the errors of those that failed."""
-    lines = list({probe.part.device.line: None for probe in probes})
+    # One to each place: a server that takes one client gets others only once that one answers.
+    lines = list(
+        {probe.part.device.line.place: probe.part.device.line for probe in probes[::-1]}.values()
+    )
     results = await asyncio.gather(*(line.connect() for line in lines), return_exceptions=True)
     lost = {}
     for line, error in zip(lines, results, strict=True):
@@ -130,21 +190,57 @@ async def _connect(probes: Sequence[Probe]) -> dict[Line, DeviceError]:
     return lost
 
 
-async def _measure_device(probe: Probe, report: DeviceReport) -> None:
+async def _measure_device(probe: Probe, report: DeviceReport, earlier: Sequence[Probe]) -> None:
     """Read a device's identity, then its block many times."""
-    # Readings of each device alone, and their longest duration.
+    # Readings of each device alone, and their longest duration; a shorter one shows no clock.
     reads, reads_s = 200, 2.0
+    least_s = 1.0 if isinstance(probe.part, ReadOnlyPart) else 0.0
     device, loop = probe.part.device, asyncio.get_running_loop()
-    report.connected = True
-    for entry in probe.part.map.identity:
-        (value,) = await device.read(entry.address, 1)
+    identity, read = probe.part.map.identity, probe.part.map.read
+
+    async def ask() -> None:
+        report.connected = True
+        await device.read_anything(identity, read)
+
+    await greet(device, [other.part.device for other in earlier], ask)
+    for entry in identity:
+        (value,) = await device.read(entry.address, 1, function=entry.function or read.function)
         report.identity.append({"address": entry.address, "expected": entry.value, "found": value})
-    await device.check_identity(probe.part.map.identity)
-    until = loop.time() + reads_s
-    for k in range(reads):
-        if k and loop.time() > until:
-            break
+    await device.check_identity(identity, read.function)
+    began, count = loop.time(), 0
+    while (
+        not count
+        or (loop.time() < began + reads_s and count < reads)
+        or (loop.time() < began + least_s)
+    ):
         await probe.read()
+        count += 1
+
+
+async def _explain(
+    probe: Probe,
+    error: DeviceError,
+    device: DeviceReport,
+    probes: Sequence[Probe],
+    rig: Rig,
+    rate_hz: float | None,
+) -> Finding:
+    """Return the likeliest mistake in the rig file that explains an error; else the error."""
+    absent = (ExcCodes.GATEWAY_PATH_UNAVIABLE, ExcCodes.GATEWAY_NO_RESPONSE)
+    line, finding = probe.part.device.line, None
+    try:
+        if isinstance(error, Refused) and error.code not in absent:
+            finding = await _likelier_block(probe, (), rig, rate_hz)
+            if not finding:
+                why = await explain_refusal(probe, error)
+                finding = probe.finding(why) if why else None
+        elif isinstance(error, Refused) or not (line.has_answered and line.traffic.came):
+            finding = await explain_absence(probe, probes)
+        elif any(entry["found"] != entry["expected"] for entry in device.identity):
+            finding = await explain_identity(probe, probes)
+    except DeviceError:
+        pass  # it stops answering meanwhile: the first error counts
+    return finding or _finding_of(error, [probe])
 
 
 async def _measure_cycles(present: Sequence[Probe], report: RigReport) -> list[Finding]:
@@ -170,6 +266,19 @@ def _finding_of(error: DeviceError, probes: Sequence[Probe]) -> Finding:
     return Finding("rig", str(error))
 
 
+def _check_speed(probe: Probe, report: DeviceReport, rate_hz: float | None) -> Iterator[Finding]:
+    """Yield a finding if a device answers too slowly for the experiment."""
+    assert report.latency
+    if probe.in_lockstep or not rate_hz:
+        return
+    if report.latency.median_ms > 1e3 * SLOW * probe.every / rate_hz:
+        yield probe.finding(
+            f"takes {report.latency.median_ms:.3g} ms to answer, too long for a sample of"
+            f" {rate_hz:g} Hz ({probe.every * 1e3 / rate_hz:.3g} ms); give it a line of its own,"
+            " raise its baud rate, or ask less often",
+        )
+
+
 def _check_device(
     probe: Probe,
     report: DeviceReport,
@@ -184,25 +293,14 @@ def _check_device(
     findings: list[Finding] = []
     # A rate needs more than one answer.
     series = together if len(together.asked) > 1 else still
-    assert report.latency
     seconds = float(series.answered[-1] - series.answered[0])
     if probe.in_lockstep and rate_hz:
         # In lockstep time is counted in samples: the computer's clock shows only how fast it
         # simulates.
         seconds = (len(series.asked) - 1) * probe.every / rate_hz
-    elif rate_hz and report.latency.median_ms > 1e3 * SLOW * probe.every / rate_hz:
-        findings.append(
-            probe.finding(
-                f"takes {report.latency.median_ms:.3g} ms to answer, too long for a sample of"
-                f" {rate_hz:g} Hz ({probe.every * 1e3 / rate_hz:.3g} ms); give it a line of its"
-                " own, raise its baud rate, or ask less often",
-            )
-        )
     if series is together:
         report.clock = measure_clock(probe, series, seconds)
-        counts_hz = (
-            rate_hz if rig.sampling == "cyclic" else rig.record_rate_hz if probe.is_drive else None
-        )
+        counts_hz = _counts_hz(probe, rig, rate_hz)
         findings += check_clock(probe, series, report.clock, seconds, counts_hz)
     if not probe.in_lockstep:
         findings += check_latch(probe, series)
@@ -217,6 +315,51 @@ def _check_device(
         values = series.of(name)[series.fresh]
         report.values[name], report.noise[name] = float(np.mean(values)), float(np.std(values))
     return findings
+
+
+async def _with_likelier(
+    probe: Probe, findings: list[Finding], rig: Rig, rate_hz: float | None
+) -> list[Finding]:
+    """Return the findings about a device, or the one likelier mistake that explains them all."""
+    if probe.in_lockstep:
+        return findings
+    misread = {finding.quantity for finding in findings} - {""}
+    if misread:
+        moved = await _likelier_block(probe, misread, rig, rate_hz)
+        findings = [moved] if moved else findings
+    lacking = await lacks_exchange(probe)
+    return [*findings, probe.finding(lacking)] if lacking else findings
+
+
+async def _likelier_block(
+    probe: Probe, misread: Collection[str], rig: Rig, rate_hz: float | None
+) -> Finding | None:
+    """Return the finding that a block is at other addresses, if all of it is credible there."""
+    for moved in moved_blocks(probe, misread):
+        series = await read_moved(moved, MOVED_S)
+        if series is not None and _is_credible(probe, series, rig, rate_hz):
+            return probe.finding(in_words(probe, moved))
+    return None
+
+
+def _is_credible(probe: Probe, series: Series, rig: Rig, rate_hz: float | None) -> bool:
+    """Return whether counter, clock and all other registers have possible values."""
+    if "sequence" not in series.block.names:  # nothing else is sure to change
+        return False
+    seconds = float(series.answered[-1] - series.answered[0])
+    counts_hz = _counts_hz(probe, rig, rate_hz)
+    clock = measure_clock(probe, series, seconds)
+    return not (
+        [*check_clock(probe, series, clock, seconds, counts_hz)]
+        or [*check_registers(probe, series, rig)]
+    )
+
+
+def _counts_hz(probe: Probe, rig: Rig, rate_hz: float | None) -> float | None:
+    """Return the rate at which a device's counter is expected to count, if it is known."""
+    if isinstance(rig, RecordingRig) or rig.sampling == "cyclic":
+        return rate_hz
+    return rig.record_rate_hz if probe.is_drive else None
 
 
 def _check_rates_equal(devices: Sequence[DeviceReport]) -> Iterator[Finding]:

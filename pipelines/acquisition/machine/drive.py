@@ -6,6 +6,7 @@ from math import isfinite, nan
 
 from pipelines.acquisition.machine.clock_offset import Bounds
 from pipelines.acquisition.machine.reading import DriveStatus, Reading
+from pipelines.acquisition.modbus.blocks import BlockReader, BlockWriter
 from pipelines.acquisition.modbus.device import Device
 from pipelines.acquisition.modbus.line import Line
 from pipelines.acquisition.modbus.ring_buffer import Queue, Ring
@@ -28,7 +29,9 @@ class Drive:
         self.control_s = rig.safety.control_s
         self.map = rig.map.drive[settings.map]
         self.device = Device(f"drive {settings.joint}", settings.unit, line, rig.safety)
-        self.read_block = Block(registers_of(self.map.read))
+        self.reader = BlockReader(self.device, self.map.read)
+        self.read_block = self.reader.block
+        self._writer = BlockWriter(self.device, self.map.write)
         self.write_block = Block(registers_of(self.map.write))
         self._counter_block = Block({"sequence": self.map.read.sequence})
         # Of a drive without a status word it is never read: every mask needs the register.
@@ -88,13 +91,13 @@ class Drive:
             No answer came in time, or the drive refused.
         """
         asked = time.perf_counter()
-        block = self.read_block
-        words = await self.device.read(block.address, block.count, in_motion=in_motion)
-        return self._reading(words, asked)
+        return self._reading(await self.reader.read(in_motion=in_motion), asked)
 
     async def read_values(self) -> Mapping[str, float]:
         """Read all quantities outside any exchange, SI units."""
-        return await self._read(self.read_block, in_motion=False)
+        values = self.read_block.decode(await self.reader.read())
+        self._refuse_not_finite(values)
+        return values
 
     async def read_status(self) -> int:
         """Read the status word alone."""
@@ -162,7 +165,12 @@ class Drive:
         # Without an answer it is unknown which set-point the drive follows.
         before, self._sent = self._sent, nan
         asked = time.perf_counter()
-        answer = await self.device.exchange(self.write_block, words, self.read_block)
+        if self._writer.exchanges:
+            answer = await self.device.exchange(self.write_block, words, self.read_block)
+        else:
+            await self._writer.write(words, control_first=False, in_motion=True)
+            asked = time.perf_counter()
+            answer = await self.reader.read(in_motion=True)
         # The sample was latched before the new set-point took effect, so it carries the one before.
         self._sent, self.answered_at = before, time.monotonic()
         reading = self._reading(answer, asked)
@@ -187,7 +195,7 @@ class Drive:
             No answer came in time, or the drive refused.
         """
         words = await self.idle_words(control, angle)
-        await self.device.write(self.write_block, words, in_motion=in_motion)
+        await self._writer.write(words, control_first=True, in_motion=in_motion)
 
     def words(self, control: int, reference: float) -> list[int]:
         """Return the registers of a control word and a set-point (rad).
@@ -256,7 +264,9 @@ class Drive:
         )
 
     async def _read(self, block: Block, *, in_motion: bool) -> Mapping[str, float]:
-        words = await self.device.read(block.address, block.count, in_motion=in_motion)
+        words = await self.device.read(
+            block.address, block.count, function=self.reader.function, in_motion=in_motion
+        )
         values = block.decode(words)
         self._refuse_not_finite(values)
         return values

@@ -3,14 +3,13 @@
 import time
 from math import inf
 
+from pipelines.acquisition.modbus.blocks import BlockReader
 from pipelines.acquisition.modbus.device import Device
 from pipelines.acquisition.modbus.line import Line
 from pipelines.acquisition.modbus.wraparound import Unwrapper
 from pipelines.acquisition.safety.watchdog import Watchdog
 from pipelines.errors import DeviceError, Unanswered
-from pipelines.modbus.register_block import Block
 from pipelines.settings.rig import RigSettings
-from pipelines.settings.rig.block import registers_of
 from pipelines.settings.rig.devices import SensorSettings
 
 
@@ -21,11 +20,11 @@ class Sensor:
         self.settings = settings
         self.map = rig.map.sensor[settings.map]
         self.device = Device(f"sensor {settings.cuff}", settings.unit, line, rig.safety)
-        self.block = Block(registers_of(self.map.read))
+        self.reader = BlockReader(self.device, self.map.read)
         self._turn = rig.turn_of(settings)
         self._watchdog = Watchdog(rig.safety.watchdog_s)
         self._in_lockstep, self._reply_s = rig.clock == "lockstep", rig.safety.longest_reply_s
-        self._counter = Unwrapper(self.block.span("sequence"))
+        self._counter = Unwrapper(self.reader.block.span("sequence"))
         self._first: tuple[float, float] | None = None
         """Count of its first sample, and when it came, host's clock, s."""
         self._last: tuple[float, float] | None = None
@@ -48,9 +47,7 @@ class Sensor:
         # The first call begins the wait, so that a sensor that never answers is noticed too.
         self._watchdog.waited(time.monotonic())
         try:
-            values = self.block.decode(
-                await self.device.read(self.block.address, self.block.count, in_motion=True)
-            )
+            values = self.reader.block.decode(await self.reader.read(in_motion=True))
         except Unanswered as error:
             if self._watchdog.has_expired(time.monotonic()):
                 raise DeviceError(str(error)) from error

@@ -4,6 +4,7 @@ import asyncio
 import time
 from collections.abc import Awaitable, Iterable, Sequence
 from contextlib import suppress
+from functools import partial
 from typing import TypeVar
 
 import numpy as np
@@ -22,6 +23,7 @@ from pipelines.acquisition.machine.force_sensor import Sensor
 from pipelines.acquisition.machine.reading import Reading
 from pipelines.acquisition.machine.row import Answers, Row
 from pipelines.acquisition.modbus.line import lines_of
+from pipelines.acquisition.modbus.one_client import greet
 from pipelines.errors import DeviceError, Unanswered
 from pipelines.mechanics.motion import CUFFS
 from pipelines.settings.rig import RigSettings
@@ -55,9 +57,11 @@ class Machine:
 
     async def connect(self) -> None:
         """Open every line and check the identity of every device."""
-        for part in self._parts:
-            await part.device.line.connect()
-            await part.device.check_identity(part.map.identity)
+        for k, part in enumerate(self._parts):
+            earlier = [other.device for other in self._parts[:k]]
+            identity, block = part.map.identity, part.map.read
+            await greet(part.device, earlier, partial(part.device.read_anything, identity, block))
+            await part.device.check_identity(identity, part.reader.function)
 
     async def refuse_driven(self) -> None:
         """Refuse to write to a rig that another program drives.

@@ -9,8 +9,7 @@ from typing import Any
 
 from pymodbus.client import AsyncModbusSerialClient, AsyncModbusTcpClient, AsyncModbusTlsClient
 from pymodbus.client.base import ModbusBaseClient
-from pymodbus.framer import FramerSocket, FramerType
-from pymodbus.pdu import DecodePDU
+from pymodbus.framer import FramerType
 from serial.tools import list_ports
 
 from pipelines.errors import SettingsError
@@ -48,10 +47,7 @@ def client_of(
         )
     if isinstance(settings, TlsLine):
         assert tls  # a TLS line has a context
-        client = AsyncModbusTlsClient(settings.host, port=settings.port, sslctx=tls, **common)
-        # pymodbus takes each TLS record for one whole frame, which TLS does not guarantee.
-        client.ctx.framer = FramerSocket(DecodePDU(False))
-        return client
+        return AsyncModbusTlsClient(settings.host, port=settings.port, sslctx=tls, **common)
     framer = FramerType.RTU if isinstance(settings, RtuOverTcpLine) else FramerType.SOCKET
     return AsyncModbusTcpClient(settings.host, port=settings.port, framer=framer, **common)
 

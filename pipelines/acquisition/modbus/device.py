@@ -9,22 +9,45 @@ from pymodbus.exceptions import ModbusException
 from pymodbus.pdu import ModbusPDU
 
 from pipelines.acquisition.modbus.line import Line
-from pipelines.acquisition.modbus.reply import InvalidReply
+from pipelines.acquisition.modbus.reply import (
+    READ_HOLDING,
+    READ_INPUT,
+    READ_WRITE,
+    WRITE_MULTIPLE,
+    WRITE_SINGLE,
+    InvalidReply,
+)
+from pipelines.acquisition.modbus.unexpected import described
 from pipelines.errors import DeviceError, Refused, Unanswered
 from pipelines.modbus.register_block import Block
+from pipelines.settings.rig.block import ReadBlock, registers_of
+from pipelines.settings.rig.recording_only import WaitSettings
 from pipelines.settings.rig.register_map import Identity
 from pipelines.settings.rig.safety import SafetySettings
 
+Waits = SafetySettings | WaitSettings
+"""Settings of a rig that say how long answers are awaited."""
 MEANING: dict[int, str] = {
-    ExcCodes.ILLEGAL_FUNCTION: "it does not know this function",
+    ExcCodes.ILLEGAL_FUNCTION: "it does not know function {function}",
     ExcCodes.ILLEGAL_ADDRESS: "it has no such register",
     ExcCodes.ILLEGAL_VALUE: "it does not take this value",
     ExcCodes.DEVICE_FAILURE: "it failed",
+    ExcCodes.ACKNOWLEDGE: "it takes longer to answer",
     ExcCodes.DEVICE_BUSY: "it is busy (server device busy)",
+    ExcCodes.NEGATIVE_ACKNOWLEDGE: "it cannot do that now",
+    ExcCodes.MEMORY_PARITY_ERROR: "its memory is damaged",
     ExcCodes.GATEWAY_PATH_UNAVIABLE: "the gateway has no path to it",
     ExcCodes.GATEWAY_NO_RESPONSE: "the gateway got no answer from it",
 }
 
+INSTEAD = {
+    READ_HOLDING: "set function = 4 in its block, if these are input registers",
+    READ_INPUT: "set function = 3 in its block, if these are holding registers",
+    WRITE_SINGLE: "set write.function = 16 in its map",
+    WRITE_MULTIPLE: "set write.function = 6 in its map",
+    READ_WRITE: "set write.function = 16 in its map",
+}
+"""What to do where a device does not know a function."""
 _GATEWAY = "check the cable behind the gateway, and the unit id in the rig file"
 REMEDY: dict[int, str] = {
     ExcCodes.DEVICE_FAILURE: "see the device's manual and its own display",
@@ -46,15 +69,31 @@ class TimeOut(NamedTuple):
 class Device:
     """One device on a line, which takes one request at a time from all its devices."""
 
-    def __init__(self, name: str, unit: int, line: Line, safety: SafetySettings) -> None:
+    def __init__(self, name: str, unit: int, line: Line, safety: Waits) -> None:
         """Join a line; a rig's safety settings give the time-outs."""
-        self.label = line.join(name, unit)
-        self.line = line
-        self._client = line.client
-        self._unit = unit
+        self.name, self._unit = name, unit
+        self.move(line)
         self._at_rest = TimeOut(safety.connect_s, "connect_s")
         self._in_motion = TimeOut(safety.longest_reply_s, "reply_s or watchdog_s")
         self._write = TimeOut(safety.watchdog_s, "watchdog_s")
+
+    def move(self, line: Line) -> None:
+        """Join a line, in place of the one before."""
+        self.label = line.join(self.name, self._unit)
+        self.line = line
+
+    async def read_anything(self, identity: Sequence[Identity], block: ReadBlock) -> None:
+        """Read one register, to see whether the device answers.
+
+        Raises
+        ------
+        DeviceError
+            No answer came in time, or an answer that refuses.
+        """
+        first = min(registers_of(block).values(), key=lambda one: one.address)
+        entry = identity[0] if identity else None
+        function = (entry.function if entry else None) or block.function
+        await self.read(entry.address if entry else first.address, 1, function=function)
 
     @property
     def awaited_s(self) -> float:
@@ -65,8 +104,15 @@ class Device:
         """Wait for the device's turn on the line, and keep it for all requests of the block."""
         return self.line.turn(self._unit)
 
-    async def check_identity(self, identity: Iterable[Identity]) -> None:
+    async def check_identity(self, identity: Iterable[Identity], function: int) -> None:
         """Refuse a device that is not the one that the rig file describes.
+
+        Parameters
+        ----------
+        identity : iterable of Identity
+            Its registers.
+        function : int
+            Function that reads those which name none.
 
         Raises
         ------
@@ -74,20 +120,24 @@ class Device:
             Names the identity register, its value and the expected one.
         """
         for entry in identity:
-            (value,) = await self.read(entry.address, 1)
+            (value,) = await self.read(entry.address, 1, function=entry.function or function)
             if value != entry.value:
                 raise DeviceError(
                     f"{self.label}: identity register {entry.address} holds 0x{value:04X}, expected"
                     f" 0x{entry.value:04X}: it is another device; check cabling and unit id"
                 )
 
-    async def read(self, address: int, count: int, *, in_motion: bool = False) -> list[int]:
-        """Read words by FC03.
+    async def read(
+        self, address: int, count: int, *, function: int = READ_HOLDING, in_motion: bool = False
+    ) -> list[int]:
+        """Read words in one request.
 
         Parameters
         ----------
         address, count : int
             First register, and number of registers.
+        function : int, optional
+            3 for holding registers, 4 for input registers.
         in_motion : bool, optional
             Whether to use the short time-out of a moving leg.
 
@@ -101,9 +151,12 @@ class Device:
         DeviceError
             No answer came in time, or an answer that refuses.
         """
-        action = f"reading registers {address} to {address + count - 1}"
+        action = f"reading {_range(address, count)}"
         time_out = self._in_motion if in_motion else self._at_rest
-        request = self._client.read_holding_registers
+        client = self.line.client
+        request = (
+            client.read_input_registers if function == READ_INPUT else client.read_holding_registers
+        )
         return await self._ask(action, count, time_out, request, address=address, count=count)
 
     async def read_fifo(self, address: int, words: int) -> list[int]:
@@ -116,7 +169,7 @@ class Device:
         """
         action = f"reading the queue at register {address}"
         response = await self._request(
-            action, self._in_motion, self._client.read_fifo_queue, address=address
+            action, self._in_motion, self.line.client.read_fifo_queue, address=address
         )
         registers = list(getattr(response, "values", []))
         if len(registers) % words:
@@ -126,8 +179,15 @@ class Device:
             )
         return registers
 
-    async def write(self, block: Block, words: Sequence[int], *, in_motion: bool = False) -> None:
-        """Write a block by FC16.
+    async def write(
+        self,
+        block: Block,
+        words: Sequence[int],
+        *,
+        function: int = WRITE_MULTIPLE,
+        in_motion: bool = False,
+    ) -> None:
+        """Write a block in one request.
 
         Parameters
         ----------
@@ -135,6 +195,8 @@ class Device:
             Registers to write.
         words : sequence of int
             One for each register.
+        function : int, optional
+            16, or 6 for a single register.
         in_motion : bool, optional
             Whether to use the short time-out of a moving leg.
 
@@ -143,10 +205,17 @@ class Device:
         DeviceError
             No answer came in time, or an answer that refuses.
         """
-        action = f"writing registers {_range(block)}"
+        action = f"writing {_range(block.address, block.count)}"
         time_out = self._in_motion if in_motion else self._write
-        request = self._client.write_registers
-        await self._ask(action, None, time_out, request, address=block.address, values=list(words))
+        client, address = self.line.client, block.address
+        if function == WRITE_SINGLE:
+            (value,) = words
+            await self._ask(
+                action, None, time_out, client.write_register, address=address, value=value
+            )
+            return
+        request = client.write_registers
+        await self._ask(action, None, time_out, request, address=address, values=list(words))
 
     async def exchange(self, write: Block, words: Sequence[int], read: Block) -> list[int]:
         """Write one block and read another in one FC23 exchange.
@@ -170,17 +239,35 @@ class Device:
         DeviceError
             No answer came in time, or an answer that refuses.
         """
-        action = f"an exchange (writing registers {_range(write)}, reading {_range(read)})"
+        action = (
+            f"an exchange (writing {_range(write.address, write.count)}, reading"
+            f" {_range(read.address, read.count).removeprefix('registers ')})"
+        )
         return await self._ask(
             action,
             read.count,
             self._in_motion,
-            self._client.readwrite_registers,
+            self.line.client.readwrite_registers,
             read_address=read.address,
             read_count=read.count,
             write_address=write.address,
             values=list(words),
         )
+
+    async def send(self, request: ModbusPDU) -> None:
+        """Send a request that has no method of its own.
+
+        Raises
+        ------
+        DeviceError
+            No answer came in time, or an answer that refuses.
+        """
+
+        def execute(device_id: int) -> Awaitable[ModbusPDU]:
+            request.dev_id = device_id
+            return self.line.client.execute(False, request)
+
+        await self._request(f"function {request.function_code}", self._at_rest, execute)
 
     async def _ask(
         self,
@@ -211,11 +298,12 @@ class Device:
             response = await self.line.ask(self._unit, time_out.seconds, request, **arguments)
         except (ModbusException, OSError) as error:
             # On an open line the next request may be answered; a lost line ends the run.
-            kind = Unanswered if self._client.connected else DeviceError
-            raise kind(
-                f"{self.label}: did not answer {action} within {time_out.seconds:.3g} s; check"
-                f" cable and power, or raise safety.{time_out.setting} in the rig file"
-            ) from error
+            kind = Unanswered if self.line.client.connected else DeviceError
+            came = described(self.line.traffic.asked, self.line.traffic.came) or (
+                f"did not answer {action} within {time_out.seconds:.3g} s; check cable and power,"
+                f" or raise safety.{time_out.setting} in the rig file"
+            )
+            raise kind(f"{self.label}: {came}") from error
         if isinstance(response, InvalidReply):
             raise DeviceError(
                 f"{self.label}: answered {action} with {response.reason}; check that it speaks"
@@ -223,16 +311,26 @@ class Device:
             )
         # pymodbus does not raise an exception for an exception reply.
         if response.isError():
-            code = int(getattr(response, "exception_code", 0))
-            meaning = f": {MEANING[code]}" if code in MEANING else ""
-            remedy = REMEDY.get(
-                code, "compare the register map in the rig file with the device's manual"
-            )
-            raise Refused(
-                f"{self.label}: answered {action} with Modbus exception {code}{meaning}; {remedy}"
-            )
+            raise self._refusal(action, response)
         return response
 
+    def _refusal(self, action: str, response: ModbusPDU) -> Refused:
+        """Return the error of an exception reply."""
+        code = int(getattr(response, "exception_code", 0))
+        function = self.line.traffic.asked.function
+        meaning = f": {MEANING[code].format(function=function)}" if code in MEANING else ""
+        remedy = REMEDY.get(
+            code, "compare the register map in the rig file with the device's manual"
+        )
+        if code == ExcCodes.ILLEGAL_FUNCTION:
+            remedy = INSTEAD.get(function, remedy)
+        refusal = Refused(
+            f"{self.label}: answered {action} with Modbus exception {code}{meaning}; {remedy}"
+        )
+        refusal.code = code
+        return refusal
 
-def _range(block: Block) -> str:
-    return f"{block.address} to {block.address + block.count - 1}"
+
+def _range(address: int, count: int) -> str:
+    """Return some registers in words."""
+    return f"register {address}" if count == 1 else f"registers {address} to {address + count - 1}"

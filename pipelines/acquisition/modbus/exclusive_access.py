@@ -13,10 +13,11 @@ from pipelines.acquisition.modbus.file_lock import take
 from pipelines.errors import DeviceError
 from pipelines.settings.rig import RigSettings
 from pipelines.settings.rig.line import LineSettings, RtuLine
+from pipelines.settings.rig.recording_only import RecordingRig
 
 
 @contextmanager
-def exclusive_access(rig: RigSettings) -> Iterator[None]:
+def exclusive_access(rig: RigSettings | RecordingRig) -> Iterator[None]:
     """Hold the lines of a rig for the duration of the block.
 
     Raises

@@ -11,11 +11,14 @@ from pymodbus.exceptions import ConnectionException, ModbusException
 from pymodbus.pdu import ModbusPDU
 
 from pipelines.acquisition.modbus.connection import client_of, explain, tls_context
+from pipelines.acquisition.modbus.framing import Traffic
 from pipelines.acquisition.modbus.reply import InvalidReply, check_replies
+from pipelines.acquisition.modbus.unexpected import as_hex
 from pipelines.errors import DeviceError
 from pipelines.settings.rig import RigSettings
 from pipelines.settings.rig.devices import DeviceSettings
 from pipelines.settings.rig.line import LineSettings, NetworkLine, RtuLine, TlsLine
+from pipelines.settings.rig.recording_only import RecordingRig
 
 BAD_SETTINGS: tuple[type[Exception], ...] = (ValueError,)
 """Errors of a serial port that cannot be set up as the rig file says."""
@@ -49,17 +52,26 @@ class Line:
         self.client = client_of(settings, self._tls, timeout_s, self._note_connection)
         # Else pymodbus closes the connection after some missing replies; the watchdog decides that.
         self.client.set_max_no_responses(sys.maxsize)
-        check_replies(self.client, self._note_reply)
+        self.traffic = Traffic()
+        check_replies(self.client, not settings.has_transaction_ids, self.traffic, self._note_reply)
         self.devices: list[str] = []
         """Names of the devices on it."""
-        self._settings, self._timeout_s, self._name = settings, timeout_s, name
+        self.settings, self._timeout_s, self._name = settings, timeout_s, name
         self._turn = asyncio.Lock()
         self._holder: asyncio.Task | None = None
         """Task that has the turn."""
         self._used = False
         """Whether it has sent a request in its turn."""
-        self._asking = self._failed = self._has_answered = False
-        """Whether a request is under way, the last one was not answered, any ever was answered."""
+        self._asking = self._failed = False
+        """Whether a request is under way, and whether the last one was not answered."""
+        self.has_answered = False
+        """Whether any request was ever answered."""
+        self.takes_one_client = False
+        """Whether the other end serves no second connection."""
+        self._answers = 0
+        """Answers on this connection."""
+        self._closes: bool | None = None
+        """Whether the other end closes a connection after one answer; None until that shows."""
         self._asked: dict[int, float] = {}
         """Event loop's time, s, since when a unit waits for its turn or its reply."""
         self._late: dict[int, LateReply] = {}
@@ -69,7 +81,7 @@ class Line:
     @property
     def has_transaction_ids(self) -> bool:
         """Whether a reply names the request that it answers."""
-        return self._settings.has_transaction_ids
+        return self.settings.has_transaction_ids
 
     def join(self, name: str, unit: int) -> str:
         """Add a device; return its label in errors."""
@@ -82,23 +94,25 @@ class Line:
         async with self._turn:
             await self._open()
 
-    async def _open(self) -> None:
+    async def _open(self, within_s: float | None = None) -> None:
         if self.client.connected:
             return
-        self.client.ctx.comm_params.timeout_connect = self._timeout_s
+        self._answers = 0
+        self.client.ctx.comm_params.timeout_connect = within_s or self._timeout_s
         try:
             is_open = await self.client.connect()
         except BAD_SETTINGS as error:
             raise DeviceError(
-                f"{self._label}: the serial port cannot be set up like that ({error}); correct"
+                f"{self.label}: the serial port cannot be set up like that ({error}); correct"
                 " baud_rate, parity or stop_bits in the rig file (a pseudo-terminal needs parity ="
                 ' "none")'
             ) from error
         if not is_open:
-            raise DeviceError(f"{self._label}: {await self._refusal()}")
+            raise DeviceError(f"{self.label}: {await self._refusal()}")
 
     def close(self) -> None:
         """Close the connection, if it is open."""
+        self._answers = 0  # so that this end is not taken for the other's
         if self.client.ctx.transport:
             # Without the closing handshake of TLS: the other end may be gone.
             cast(asyncio.Transport, self.client.ctx.transport).abort()
@@ -167,20 +181,27 @@ class Line:
         self._used = True
         self._asked.setdefault(unit, asyncio.get_running_loop().time())
         try:
-            await self._pause()
-            # pymodbus uses this one setting as time-out of connections and replies alike.
-            self.client.ctx.comm_params.timeout_connect = within_s
-            self._asking = self._failed = True
-            answer = await request(**arguments, device_id=unit)
+            try:
+                answer = await self._send(unit, within_s, request, arguments)
+            except (ModbusException, OSError):
+                # The request may have met a connection that ends after its first answer.
+                ended = not self.client.connected and not self.traffic.came and self._answers == 1
+                if not ended or self._closes is False:
+                    raise
+                self._closes = True
+                answer = await self._send(unit, within_s, request, arguments)
+            self._answers += 1
+            if self._answers == 2:
+                self._closes = False
             # The reply to another request counts as an answer, but the next try needs a new
             # connection.
-            self._failed, self._has_answered = isinstance(answer, InvalidReply), True
+            self._failed, self.has_answered = isinstance(answer, InvalidReply), True
             self._asked.pop(unit, None)
             return answer
         except (ModbusException, OSError) as error:
             if self.client.connected:
                 raise
-            raise DeviceError(f"{self._label}: {self._loss()}") from error
+            raise DeviceError(f"{self.label}: {self._loss()}") from error
         finally:
             if self._asking:
                 self._quiet_since = asyncio.get_running_loop().time()
@@ -189,6 +210,23 @@ class Line:
                 if unit in self._asked and (len(self.devices) > 1 or not self.has_transaction_ids):
                     self._late[unit] = LateReply(within_s)
             self._asking = False
+
+    async def _send(
+        self,
+        unit: int,
+        within_s: float,
+        request: Callable[..., Awaitable[ModbusPDU]],
+        arguments: dict[str, Any],
+    ) -> ModbusPDU:
+        """Send a request, on a new connection where each takes one only."""
+        if self._closes:
+            self.close()
+            await self._open(within_s)
+        await self._pause()
+        # pymodbus uses this one setting as time-out of connections and replies alike.
+        self.client.ctx.comm_params.timeout_connect = within_s
+        self._asking = self._failed = True
+        return await request(**arguments, device_id=unit)
 
     def awaited_s(self, unit: int) -> float:
         """Return for how long a unit's reply, or its turn, has been awaited, s; 0 for none."""
@@ -220,17 +258,20 @@ class Line:
             self._late[unit].came.set()
 
     @property
-    def _label(self) -> str:
+    def label(self) -> str:
+        """Its name in errors; that of its first device where it has none."""
         return f"line {self._name} ({self.place})" if self._name else self.devices[0]
 
     async def _pause(self) -> None:
         """Wait for the pause that separates two frames on the line."""
-        if self._settings.quiet_s:
+        if self.settings.quiet_s:
             loop = asyncio.get_running_loop()
-            await asyncio.sleep(max(0.0, self._quiet_since + self._settings.quiet_s - loop.time()))
+            await asyncio.sleep(max(0.0, self._quiet_since + self.settings.quiet_s - loop.time()))
 
     def _note_connection(self, connected: bool) -> None:
         """End the request that is under way when the connection ends: no reply will come."""
+        if not connected and not self._asking and self._answers == 1 and self._closes is None:
+            self._closes = True
         answer = self.client.ctx.response_future
         if self._asking and not connected and not answer.done():
             answer.set_exception(ConnectionException("lost"))
@@ -239,25 +280,50 @@ class Line:
         """Return in words how the connection was lost, and for which devices."""
         others = f", and with it {', '.join(self.devices)}" if self._name else ""
         # With TLS 1.3 a client is refused only after its connection seems complete.
-        if isinstance(self._settings, TlsLine) and not self._has_answered:
+        if isinstance(self.settings, TlsLine) and not self.has_answered:
             return (
                 f"the other end closed the line before its first answer{others}; it does not trust"
                 " the certificate and key in the rig file, or has stopped"
             )
-        return f"the line is lost{others}; check cable and power"
+        if self.has_answered or isinstance(self.settings, RtuLine):
+            return f"the line is lost{others}; check cable and power"
+        came = self.traffic.came
+        after = f"after {len(came)} bytes ({as_hex(came)})" if came else "without an answer"
+        return (
+            f"the other end closed the line {after}{others}; check transport (TCP or RTU frames),"
+            " port, and that no other program uses it"
+        )
+
+    @property
+    def closes(self) -> bool:
+        """Whether the other end closes a connection after one answer."""
+        return bool(self._closes)
+
+    @property
+    def peculiarities(self) -> list[str]:
+        """What the line does that others do not, in words; it is served all the same."""
+        notes = []
+        if self._closes:
+            notes.append(
+                f"{self.label}: closes its connection after each answer; each request opens a new"
+                " one, which takes time"
+            )
+        if self.takes_one_client:
+            notes.append(f"{self.label}: serves one client; all devices there share a connection")
+        if self.traffic.echoes:
+            notes.append(f"{self.label}: the adapter sends back each request; that is passed over")
+        return notes
 
     async def _refusal(self) -> str:
         """Return why there is no connection, which pymodbus only logs."""
         try:
-            if isinstance(self._settings, NetworkLine):
-                await asyncio.get_running_loop().getaddrinfo(
-                    self._settings.host, self._settings.port
-                )
-            if isinstance(self._settings, RtuLine):
+            if isinstance(self.settings, NetworkLine):
+                await asyncio.get_running_loop().getaddrinfo(self.settings.host, self.settings.port)
+            if isinstance(self.settings, RtuLine):
                 serial.Serial(self.place, exclusive=True).close()
-            elif isinstance(self._settings, TlsLine):
+            elif isinstance(self.settings, TlsLine):
                 opening = asyncio.open_connection(
-                    self._settings.host, self._settings.port, ssl=self._tls
+                    self.settings.host, self.settings.port, ssl=self._tls
                 )
                 _, writer = await asyncio.wait_for(opening, self._timeout_s)
                 writer.close()
@@ -266,7 +332,7 @@ class Line:
         return "refuses the connection; check that the rig is on, and host and port in the rig file"
 
 
-def lines_of(rig: RigSettings) -> Callable[[DeviceSettings], Line]:
+def lines_of(rig: RigSettings | RecordingRig) -> Callable[[DeviceSettings], Line]:
     """Return a function from a device's settings to its line, one for all devices that share it."""
     timeout_s = rig.safety.connect_s
     shared = {name: Line(settings, timeout_s, name) for name, settings in rig.line.items()}

@@ -11,9 +11,12 @@ from pymodbus.client.base import ModbusBaseClient
 from pymodbus.pdu import DecodePDU, ExceptionResponse, ModbusPDU
 from pymodbus.pdu.file_message import ReadFifoQueueResponse
 
+from pipelines.acquisition.modbus.framing import RtuFramer, TcpFramer, Traffic
+
 ERROR = 0x80
-READ_HOLDING, WRITE_MULTIPLE, READ_FIFO, READ_WRITE = 3, 16, 24, 23
-ASKED_FOR = (READ_HOLDING, WRITE_MULTIPLE, READ_FIFO, READ_WRITE)
+READ_HOLDING, READ_INPUT, WRITE_SINGLE, WRITE_MULTIPLE = 3, 4, 6, 16
+READ_WRITE, READ_FIFO = 23, 24
+ASKED_FOR = (READ_HOLDING, READ_INPUT, WRITE_SINGLE, WRITE_MULTIPLE, READ_WRITE, READ_FIFO)
 
 
 class InvalidReply(ModbusPDU):
@@ -69,8 +72,8 @@ class ReplyDecoder(DecodePDU):
 
 def _is_whole(function: int, frame: bytes) -> bool:
     """Return whether a reply has the length of its function and counts."""
-    if function == WRITE_MULTIPLE:
-        # Function, address and count.
+    if function in (WRITE_SINGLE, WRITE_MULTIPLE):
+        # Function, address, and value or count.
         return len(frame) == 5
     if function == READ_FIFO:
         size, count = int.from_bytes(frame[1:3], "big"), int.from_bytes(frame[3:5], "big")
@@ -104,7 +107,11 @@ class ReplyCheck:
             return f"transaction {reply.transaction_id}, expected {asked.transaction_id}"
         if reply.function_code & ~ERROR != asked.function_code:
             return f"function {reply.function_code}, expected {asked.function_code}"
-        if isinstance(reply, ExceptionResponse) or reply.function_code != WRITE_MULTIPLE:
+        if isinstance(reply, ExceptionResponse):
+            return None
+        if reply.function_code == WRITE_SINGLE:
+            return self._other_write(reply)
+        if reply.function_code != WRITE_MULTIPLE:
             return None
         if (reply.address, reply.count) != (asked.address, asked.count):
             return (
@@ -113,11 +120,25 @@ class ReplyCheck:
             )
         return None
 
+    def _other_write(self, reply: ModbusPDU) -> str | None:
+        asked = self._asked
+        written, expected = (reply.address, reply.registers[0]), (asked.address, asked.registers[0])
+        if written == expected:
+            return None
+        return (
+            f"0x{written[1]:04X} written at {written[0]}, expected 0x{expected[1]:04X} at"
+            f" {expected[0]}"
+        )
 
-def check_replies(client: ModbusBaseClient, note_reply: Callable[[int], None]) -> None:
+
+def check_replies(
+    client: ModbusBaseClient, in_rtu: bool, traffic: Traffic, note_reply: Callable[[int], None]
+) -> None:
     """Let a client return only checked replies, and an InvalidReply for any other frame.
 
     ``note_reply`` is called with the unit of every frame that comes, awaited or not.
     """
-    client.ctx.framer.decoder = ReplyDecoder()
+    # pymodbus takes each TLS record for one whole frame, which TLS does not guarantee; so TLS has
+    # the frames of TCP.
+    client.ctx.framer = (RtuFramer if in_rtu else TcpFramer)(ReplyDecoder(), traffic)
     client.ctx.trace_pdu = ReplyCheck(note_reply)

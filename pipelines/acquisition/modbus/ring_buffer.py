@@ -1,4 +1,4 @@
-"""A drive's own record of its samples: a ring of registers (FC03) or a queue (FC24).
+"""A drive's own record of its samples: a ring of registers or a queue (FC24).
 
 Samples that were overwritten before they could be read are gaps in the sequence numbers. No record
 is mistaken for another: each has its number, and the newest number is read again after the records,
@@ -46,6 +46,7 @@ class Ring:
         self._newest = Block({"newest": settings.newest})
         self._record = Block(registers_of(settings.record))
         self._span = int(self._record.span("sequence"))
+        self._function = settings.function
         self._address, self._capacity = settings.address, settings.capacity
         self._words = settings.words
         self.block = settings.records_per_read
@@ -92,13 +93,17 @@ class Ring:
             # A read ends at the ring's last register: the next record is at its first one.
             count = min(newest + 1 - first, self.block, self._capacity - first % self._capacity)
             place = self._address + first % self._capacity * self._words
-            words = await self._device.read(place, count * self._words, in_motion=True)
+            words = await self._device.read(
+                place, count * self._words, function=self._function, in_motion=True
+            )
             read += [
                 (first + k, words[k * self._words : (k + 1) * self._words]) for k in range(count)
             ]
             first += count
         sent = time.perf_counter()
-        words = await self._device.read(self._newest.address, self._newest.count, in_motion=True)
+        words = await self._device.read(
+            self._newest.address, self._newest.count, function=self._function, in_motion=True
+        )
         value = self._newest.decode(words)["newest"]
         newest_now = int(unwrap(value, newest, self._span))
         # So far from the expected number, all records are overwritten, or the reply is damaged.

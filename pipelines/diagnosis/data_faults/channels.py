@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import median_abs_deviation
 
+from pipelines.contracts.fault_kind import FaultKind
 from pipelines.contracts.joints import the
 from pipelines.diagnosis.data_faults.fault import (
     WHOLE_ROW,
@@ -17,6 +18,8 @@ from pipelines.diagnosis.data_faults.fault import (
     stretches,
     when,
 )
+from pipelines.diagnosis.data_faults.proof import Proof, compared, predictions
+from pipelines.diagnosis.data_faults.rigid_fit import averages
 from pipelines.mechanics.motion import CUFFS, Motion
 from pipelines.mechanics.stretches import edge
 from pipelines.signals.blocks import dilate
@@ -93,6 +96,7 @@ def _repeated(motion: Motion) -> Iterator[Fault]:
         share, intervals = samples.mean(), stretches(samples)
         who = "every device" if together else f"{the(motion.joints[j])}'s drive"
         yield Fault(
+            FaultKind.STALE,
             motion.file,
             WHOLE_ROW if together else column(motion, j, "angle"),
             f"{samples.sum()} repeated samples ({100 * share:.2g} %), {when(motion, intervals)}:"
@@ -111,11 +115,22 @@ def _copied(motion: Motion) -> Iterator[Fault]:
         ):
             one, other = (column(motion, k, "torque") for k in (i, j))
             yield Fault(
+                FaultKind.COPY,
                 motion.file,
                 other,
                 f"{one} and {other} are equal in every sample: probably one drive was read twice;"
                 " check its address, register or column",
+                proof=_of_one_alone(motion, (i, j)),
             )
+
+
+def _of_one_alone(motion: Motion, joints: tuple[int, int]) -> Proof | None:
+    """Return what it changes to leave the less plausible of two equal torques out."""
+    run = averages(motion)
+    if run is None:
+        return None
+    both = [predictions(run)[j] for j in joints]
+    return compared(both, [min(both, key=lambda one: one.unexplained)])
 
 
 def _count_of(angle: NDArray) -> float:
@@ -145,6 +160,7 @@ def _stuck_angle(motion: Motion, joint: int) -> Iterator[Fault]:
         # The filter spreads the standstill into its neighbourhood.
         reach = edge(motion.sample_rate_hz, motion.cutoff_hz)
         yield Fault(
+            FaultKind.STUCK,
             motion.file,
             column(motion, joint, "angle"),
             f"{the(motion.joints[joint])}'s angle is stuck: constant for"
@@ -219,6 +235,7 @@ def _saturated(motion: Motion, joint: int, tops: NDArray) -> Fault:
     samples = mask_of(tops, len(torque))
     limits = " and ".join(f"{value:.4g} {unit}" for value in sorted({torque[a] for a, _ in tops}))
     return Fault(
+        FaultKind.SATURATED,
         motion.file,
         column(motion, joint, "torque"),
         f"{the(motion.joints[joint])}'s torque is saturated: clipped at {limits} in {samples.sum()}"
@@ -231,6 +248,7 @@ def _saturated(motion: Motion, joint: int, tops: NDArray) -> Fault:
 def _stuck_torque(motion: Motion, joint: int, stuck: NDArray) -> Fault:
     samples = mask_of(stuck, len(motion.torque))
     return Fault(
+        FaultKind.STUCK,
         motion.file,
         column(motion, joint, "torque"),
         f"{the(motion.joints[joint])}'s torque is stuck: constant for"
@@ -267,12 +285,13 @@ def _forces(motion: Motion, forces: NDArray) -> Iterator[Fault]:
     """Report cuff force channels that are dead, or constant for at least ``STUCK_FORCE_S``."""
     if has_silent_cuffs(motion):
         yield Fault(
+            FaultKind.CUFFS,
             motion.file,
             f"{CUFFS[0]}_force_x_n",
             "all twelve cuff forces are constant all along with the person inside: no sensor"
             " answers. They are left out; check the sensors' supply and bus, or leave their"
             " columns out",
-            np.zeros(len(motion), dtype=bool),
+            without_cuffs=True,
         )
         return
     least = round(STUCK_FORCE_S * motion.sample_rate_hz)
@@ -282,15 +301,17 @@ def _forces(motion: Motion, forces: NDArray) -> Iterator[Fault]:
             if not len(still):
                 continue
             samples = mask_of(still, len(motion))
-            # A channel that is dead all along has no good sample, so no mask helps.
+            # A channel that is dead all along has no good sample: the run's cuffs are left out.
             dead = samples.all()
             # All twelve were not dead above.
             extent = "all along while other sensors changed" if dead else when(motion, still)
             yield Fault(
+                FaultKind.CUFFS,
                 motion.file,
                 f"{cuff}_force_{axis}_n",
                 f"the {cuff.replace('_', ' ')} cuff's {axis} force is"
                 f" {'dead' if dead else 'stuck'}: constant {extent};"
                 " check the sensor's supply and cable, or leave its column out",
                 None if dead else samples,
+                without_cuffs=bool(dead),
             )

@@ -1,11 +1,13 @@
-"""A fault of acquisition, with the samples of the channel that are wrong."""
+"""A fault of acquisition, with its proof, and the samples of the channel that are wrong."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from pipelines.contracts.fault_kind import FaultKind
 from pipelines.contracts.joints import joints_of
+from pipelines.diagnosis.data_faults.proof import Proof, Ruling
 from pipelines.mechanics.motion import Motion
 
 WHOLE_ROW = "all channels"
@@ -15,18 +17,56 @@ WHOLE_ROW = "all channels"
 class Fault:
     """One fault of a recording that is not physics."""
 
+    kind: FaultKind
     file: str
     channel: str
     """The column's name in the file, or ``WHOLE_ROW``."""
     what: str
     """The fault, its extent, its time, and the remedy."""
     samples: NDArray | None = None
-    """(n,) bool, the samples to mask; None where masking does not help: no physics is judged."""
+    """(n,) bool, the samples that are left out; None where the channel is used as recorded."""
+    proof: Proof | None = None
+    """What mending it would change; None where it is left out, or nothing can be compared."""
+    without_cuffs: bool = False
+    """Whether the run's cuff forces are left out."""
+    accepted: bool = False
+    """Whether the user overruled its veto."""
+
+    @property
+    def ruling(self) -> Ruling:
+        """What it may do to the diagnosis."""
+        return self.proof.ruling if self.proof else Ruling.CAVEAT
+
+    @property
+    def is_veto(self) -> bool:
+        """Whether it stops the diagnosis, unless the user accepts it."""
+        return self.ruling is Ruling.VETO
 
     @property
     def spoils(self) -> bool:
         """Whether it prevents any statement on the physics of the session."""
-        return self.samples is None
+        return self.is_veto and not self.accepted
+
+    @property
+    def is_used(self) -> bool:
+        """Whether the diagnosis uses what is wrong as it was recorded."""
+        return self.samples is None and not self.without_cuffs
+
+    @property
+    def in_words(self) -> str:
+        """The fault, its remedy, its proof, and how to overrule it."""
+        if self.proof is None:
+            return self.what
+        told = f"{self.what}. {self.proof.in_words}"
+        if self.accepted:
+            return f'{told}; accepted by [diagnose] accept = ["{self.kind}"]'
+        if self.is_veto:
+            return f'{told}; if it is right as it is, set [diagnose] accept = ["{self.kind}"]'
+        return f"{told}: too little to stop at"
+
+    def judged(self, accept: tuple[FaultKind, ...]) -> "Fault":
+        """Return the fault, accepted where the user overrules a veto of its kind."""
+        return replace(self, accepted=self.is_veto and self.kind in accept)
 
 
 def column(motion: Motion, joint: int, quantity: str) -> str:

@@ -9,7 +9,10 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
+from pipelines.contracts.fault_kind import FaultKind
 from pipelines.diagnosis.data_faults.fault import Fault
+from pipelines.diagnosis.data_faults.mends import mended
+from pipelines.diagnosis.data_faults.proof import by_motion
 from pipelines.mechanics.motion import Motion
 
 UNEVEN = 0.05
@@ -49,12 +52,14 @@ def sampling_faults(motion: Motion) -> Iterator[Fault]:
     jitter = np.sqrt(variance) * motion.sample_rate_hz
     if jitter > UNEVEN and sums.sum() > SURE * np.sqrt(len(sums)) * sums.std():
         yield Fault(
+            FaultKind.CLOCK,
             motion.file,
             "time_s",
             "clock jitter: the stamps are even, but all angles jump together. The samples are"
             f" {100 * jitter:.2g} % of a sample period rms"
             f" ({1e3 * jitter / motion.sample_rate_hz:.2g} ms) off, all along; store the measured"
             " instants, not the planned ones",
+            proof=by_motion(motion, mended(motion, angle=_taken_evenly(motion))),
         )
 
 
@@ -63,3 +68,15 @@ def _undisturbed(motion: Motion) -> NDArray:
     even = np.abs(np.diff(motion.time) * motion.sample_rate_hz - 1.0) < EVEN
     good = motion.valid[1:] & motion.valid[:-1] & even
     return np.asarray(np.lib.stride_tricks.sliding_window_view(good, WINDOW - 1).all(axis=1))
+
+
+def _taken_evenly(motion: Motion) -> NDArray:
+    """Return the angles (n, J) without the steps that all joints make together.
+
+    Each sample's delay is the one that brings the angles closest to the smooth motion.
+    """
+    assert motion.measured_angle is not None
+    stray = motion.measured_angle - motion.q
+    squares = np.sum(motion.dq**2, axis=1)
+    delay = np.sum(stray * motion.dq, axis=1) / np.maximum(squares, np.mean(squares) / SURE)
+    return np.asarray(motion.measured_angle - delay[:, np.newaxis] * motion.dq)

@@ -7,12 +7,15 @@ the wrong sign.
 """
 
 from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from pipelines.contracts.fault_kind import FaultKind
 from pipelines.contracts.joints import the
 from pipelines.diagnosis.data_faults.fault import Fault, column
+from pipelines.diagnosis.data_faults.proof import by_motion
 from pipelines.diagnosis.evidence.baseline import Baseline, baseline_of
 from pipelines.diagnosis.evidence.baseline_columns import columns_under
 from pipelines.diagnosis.evidence.observed_run import Run, observe
@@ -21,7 +24,7 @@ from pipelines.estimation.regression import by_segment
 from pipelines.estimation.sandwich import sandwich
 from pipelines.mechanics.mechanisms.single import PENDULUM
 from pipelines.mechanics.motion import Motion
-from pipelines.mechanics.origin import settings_of
+from pipelines.mechanics.origin import mend_in
 
 LEAST_BLOCKS = 50
 """Fewest averages from which an interval is estimated."""
@@ -41,13 +44,14 @@ def sign_faults(motion: Motion) -> Iterator[Fault]:
     channel = column(motion, 0, "torque")
     (body, loss), (low, lost_low), (high, lost_high) = estimates, estimates - half, estimates + half
     yield Fault(
+        FaultKind.SIGN,
         motion.file,
         channel,
         f"the sign of {channel} is reversed, all along: as recorded {the(joint.name)} has an"
         f" inertia of {body:.4g} {inertia.unit} ({low:.4g} … {high:.4g}) and friction that loses"
         f" {loss:.2g} W ({lost_low:.2g} … {lost_high:.2g}). Both must be positive. A reversed"
-        f" {column(motion, 0, 'angle')} looks the same; reverse the sign in"
-        f" {settings_of(motion)}, if every run has it, and in this recording",
+        f" {column(motion, 0, 'angle')} looks the same; {mend_in(motion, 'sign')}",
+        proof=by_motion(motion, replace(motion, torque=-motion.torque)),
     )
 
 

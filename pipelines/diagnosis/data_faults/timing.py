@@ -4,13 +4,14 @@ from collections.abc import Iterator
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import minimum_filter1d
 
+from pipelines.contracts.fault_kind import FaultKind
 from pipelines.diagnosis.data_faults.fault import Fault
+from pipelines.diagnosis.data_faults.mends import mended
+from pipelines.diagnosis.data_faults.proof import Ruling, by_motion
 from pipelines.mechanics.motion import Motion
+from pipelines.signals.sampling import HORIZON, local_period, missing_samples, sample_rate
 
-HORIZON = 50
-"""Samples within which a late stamp is followed by one that is not late."""
 SINGLE = 3
 """Most missing samples in a row that count as dropped; more are a gap."""
 JITTER = 0.04
@@ -18,9 +19,6 @@ JITTER = 0.04
 an encoder count."""
 HALF, SURE = 0.5, 3.0
 """Share of the stamps' deviation that the angles follow, between none and all; standard errors."""
-BELOW = 0.5
-"""Share of the angles' own noise. Wrong stamps that change the angles by less add at most an eighth
-to that noise."""
 BLOCK = 20
 """Samples in a sum; such sums are nearly independent."""
 RATE = 0.01
@@ -30,33 +28,33 @@ that."""
 
 def timing_faults(motion: Motion) -> Iterator[Fault]:
     """Yield the faults of the time stamps of one run."""
+    if len(motion) < 2:
+        return
     late = motion.time * motion.sample_rate_hz - np.arange(len(motion))
-    missing = _missing_samples(motion, late)
-    yield from _missing(motion, missing)
+    missing = _missing(motion)
+    yield from _lost(motion, missing)
     yield from _counter(motion)
     # Without the samples that are missing, even stamps lie on a grid of the nominal rate.
     on_grid = late - np.concatenate([[0.0], np.cumsum(missing)])
+    # A rate that changes is no jitter, so steps are compared with those around them.
+    steps = np.diff(motion.time) / local_period(motion.time) - missing
     # The difference of two independent deviations has twice their variance.
-    jitter = float(np.std(np.diff(on_grid))) / np.sqrt(2.0)
+    jitter = float(np.std(steps)) / np.sqrt(2.0)
     if jitter > JITTER:
         yield _irregular(motion, on_grid, jitter)
     yield from _rate(motion, on_grid)
 
 
-def _missing_samples(motion: Motion, late: NDArray) -> NDArray:
+def _missing(motion: Motion) -> NDArray:
     """Return how many samples are missing before each but the first, (n - 1,) whole numbers.
 
-    The counter shows them. Without one: a missing sample makes all later samples late, a late stamp
-    only itself. So the step is sought in the lower envelope of the lateness: ``late`` (n,) is the
-    time in sample periods, less the sample's number.
+    The counter shows them, or else the stamps.
     """
-    if motion.sequence is not None:
-        step = _counted(motion.sequence)
-        # A counter that jumps where time does not is a fault of its own: no sample is missing.
-        return np.where(_disagrees(motion, step), 0, np.maximum(step - 1, 0))
-    # The negative origin makes the window look ahead.
-    ahead = minimum_filter1d(late, HORIZON, origin=-(HORIZON // 2), mode="nearest")
-    return np.maximum(np.rint(np.diff(ahead)), 0.0).astype(np.int64)
+    if motion.sequence is None:
+        return missing_samples(motion.time)
+    step = _counted(motion.sequence)
+    # A counter that jumps where time does not is a fault of its own: no sample is missing.
+    return np.where(_disagrees(motion, step), 0, np.maximum(step - 1, 0))
 
 
 def _counted(sequence: NDArray) -> NDArray:
@@ -75,13 +73,14 @@ def _disagrees(motion: Motion, step: NDArray) -> NDArray:
     return np.abs(np.diff(motion.time) * motion.sample_rate_hz - step) > SINGLE
 
 
-def _missing(motion: Motion, missing: NDArray) -> Iterator[Fault]:
+def _lost(motion: Motion, missing: NDArray) -> Iterator[Fault]:
     # The missing samples are absent already, and those around them are valid.
     nothing_to_mask = np.zeros(len(motion), dtype=bool)
     long, few = missing > SINGLE, (missing > 0) & (missing <= SINGLE)
     if long.any():
         k = int(np.argmax(missing))
         yield Fault(
+            FaultKind.CLOCK,
             motion.file,
             "time_s",
             f"{_count(long.sum(), 'gap')} in the recording, the longest of {missing[k]} missing"
@@ -93,6 +92,7 @@ def _missing(motion: Motion, missing: NDArray) -> Iterator[Fault]:
         first, last = motion.time[:-1][few][[0, -1]]
         lost = int(missing[few].sum())
         yield Fault(
+            FaultKind.CLOCK,
             motion.file,
             "time_s",
             f"{_count(lost, 'dropped sample')} ({100 * lost / (len(motion) + lost):.2g} %) "
@@ -111,6 +111,9 @@ def _counter(motion: Motion) -> Iterator[Fault]:
     if motion.sequence is None:
         return
     step = _counted(motion.sequence)
+    # By the counter a restart is one sample later, and a row that repeats one is left out.
+    by_counter = np.concatenate([[0.0], np.cumsum(np.where(step < 0, 1, step))])
+    proof = by_motion(motion, mended(motion, motion.time[0] + by_counter / motion.sample_rate_hz))
     back, stands = step < 0, step == 0
     for bad, what, remedy in (
         (back, "goes back", "the device restarted: split the file there"),
@@ -125,35 +128,38 @@ def _counter(motion: Motion) -> Iterator[Fault]:
             first = motion.time[1:][np.argmax(bad)]
             # No mask: nothing shows which rows are right.
             yield Fault(
+                FaultKind.CLOCK,
                 motion.file,
                 "sequence",
                 f"the sample counter {what} {_count(bad.sum(), 'time')}, first at {first:.2f} s:"
                 f" {remedy}",
+                proof=proof,
             )
 
 
 def _irregular(motion: Motion, on_grid: NDArray, jitter: float) -> Fault:
-    """Report uneven steps. They spoil a run whose angles contradict the stamps, or are unknown.
+    """Report uneven steps.
 
-    Samples that were taken unevenly are valid where the stamps are right. Where the angles are too
-    coarse to show that, a wrong stamp changes them too little to matter. It may matter as little
-    where the angles do show it.
+    Samples that were taken unevenly are valid where the stamps are right. Where only the stamps
+    are wrong, even ones mend the run.
     """
-    if motion.measured_angle is None:
-        explained, spoils = "take time from the device's clock, not from the host's", True
-    else:
-        explained, spoils = _judged(motion, motion.measured_angle, on_grid)
+    explained, wrong = "take time from the device's clock, not from the host's", True
+    if motion.measured_angle is not None:
+        explained, wrong = _judged(motion, motion.measured_angle, on_grid)
+    even = motion.time - (on_grid - on_grid[0]) / motion.sample_rate_hz
     return Fault(
+        FaultKind.CLOCK,
         motion.file,
         "time_s",
         f"clock jitter: irregular time steps, {100 * jitter:.2g} % of a sample period rms"
         f" ({1e3 * jitter / motion.sample_rate_hz:.2g} ms) off, all along; {explained}",
-        None if spoils else np.zeros(len(motion), dtype=bool),
+        samples=None if wrong else np.zeros(len(motion), dtype=bool),
+        proof=by_motion(motion, mended(motion, even)) if wrong else None,
     )
 
 
 def _judged(motion: Motion, angle: NDArray, on_grid: NDArray) -> tuple[str, bool]:
-    """Return the meaning of uneven stamps, and whether they spoil the run.
+    """Return the meaning of uneven stamps, and whether they are wrong.
 
     The roughness of the angles (n, J) is compared with that due to stamps off their grid, (n,).
     Third differences hold noise of angles and of stamps, and no smooth motion.
@@ -164,8 +170,7 @@ def _judged(motion: Motion, angle: NDArray, on_grid: NDArray) -> tuple[str, bool
     whole = len(rough) // BLOCK * BLOCK
     # Neighbouring differences share samples; sums over so many are nearly independent.
     sums = np.sum(rough * stray, axis=1)[:whole].reshape(-1, BLOCK).sum(axis=1)
-    tiny = np.finfo(float).tiny
-    scale = max(float(np.sum(stray**2)), tiny)
+    scale = max(float(np.sum(stray**2)), np.finfo(float).tiny)
     # 1 where the samples were taken at the stamps, 0 where they were taken evenly.
     followed = float(np.sum(rough * stray)) / scale
     error = float(np.sqrt(len(sums)) * np.std(sums)) / scale
@@ -177,13 +182,8 @@ def _judged(motion: Motion, angle: NDArray, on_grid: NDArray) -> tuple[str, bool
             " out; better take time from the device's clock"
         )
         return words, False
-    reason = "the angles are smooth against the sample count, so only the stamps are wrong: "
-    # Change of an angle by the stamps' deviation, over the angle's own noise.
-    share = float(np.max(np.std(stray, axis=0) / np.maximum(np.std(rough, axis=0), tiny)))
-    if share < BELOW:
-        noise = f"{100 * share:.2g} % of the angles' own noise"
-        return f"{reason}by {noise} at most, and nothing is lost", False
-    return f"{reason}rebuild time_s from the device's counter and sample rate", True
+    words = "the angles are smooth against the sample count, so only the stamps are wrong: rebuild"
+    return f"{words} time_s from the device's counter and sample rate", True
 
 
 def _rate(motion: Motion, on_grid: NDArray) -> Iterator[Fault]:
@@ -193,12 +193,23 @@ def _rate(motion: Motion, on_grid: NDArray) -> Iterator[Fault]:
     # The median ignores spans with a late stamp.
     drift = float(np.median(on_grid[HORIZON:] - on_grid[:-HORIZON])) / HORIZON
     # A rate that changes within the run differs in median and mean: that is no wrong clock.
-    overall = float(on_grid[-1] - on_grid[0]) / (len(motion) - 1)
-    if min(abs(drift), abs(overall)) > RATE:
-        yield Fault(
-            motion.file,
-            "time_s",
-            f"the clock runs at another rate than sample_rate_hz: {1.0 + drift:.4g} nominal"
-            f" periods a sample, {motion.sample_rate_hz / (1.0 + drift):.5g} Hz in place of"
-            f" {motion.sample_rate_hz:g} Hz; correct the wrong one",
-        )
+    overall = motion.sample_rate_hz / sample_rate(motion.time) - 1.0
+    if min(abs(drift), abs(overall)) <= RATE:
+        return
+    fault = Fault(
+        FaultKind.CLOCK,
+        motion.file,
+        "time_s",
+        f"the clock runs at another rate than sample_rate_hz: {1.0 + drift:.4g} nominal"
+        f" periods a sample, {motion.sample_rate_hz / (1.0 + drift):.5g} Hz in place of"
+        f" {motion.sample_rate_hz:g} Hz; correct the wrong one",
+        proof=by_motion(motion, mended(motion, motion.time[0] + _nominal(motion))),
+    )
+    # Where the nominal rate would make most of the error, it is the stamps that are right.
+    if fault.ruling is not Ruling.REFUTED:
+        yield fault
+
+
+def _nominal(motion: Motion) -> NDArray:
+    """Return times (n,) s from the first sample on, by the nominal rate."""
+    return np.arange(len(motion)) / motion.sample_rate_hz

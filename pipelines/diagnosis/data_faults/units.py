@@ -4,34 +4,38 @@ A factor near one is a gain, and physics. Only factors that no calibration error
 here.
 """
 
+from collections import Counter
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from itertools import combinations
 
 import numpy as np
 from numpy.typing import NDArray
 
+from pipelines.contracts.fault_kind import FaultKind
 from pipelines.contracts.joints import the
 from pipelines.diagnosis.data_faults.fault import Fault, column
-from pipelines.diagnosis.data_faults.nonnegative_leg import Averages, fit
+from pipelines.diagnosis.data_faults.mends import mended
+from pipelines.diagnosis.data_faults.proof import (
+    AGREES,
+    Prediction,
+    Proof,
+    Ruling,
+    by_motion,
+    predictions,
+)
+from pipelines.diagnosis.data_faults.rigid_fit import Averages, Columns, fit, predicted
 from pipelines.mechanics.motion import Motion
-from pipelines.mechanics.origin import settings_of
+from pipelines.mechanics.origin import mend_in
 
 WRONG = 3.0
 """Least factor that is no gain, where it is well measured."""
-WRONG_BETWEEN_JOINTS = 5.0
-"""The same where missing physics of one joint can look like a factor of 2 to 3."""
 SHANK_KG_M = {"exo_alone": 0.5, "with_human": 1.6}
 """A shank's mass times the distance of its centre from the knee: 1-4 kg of machine at 0.2-0.3 m,
 and 6 % of 50-100 kg of person at 0.25 m (Winter, Biomechanics and Motor Control of Human Movement,
 table 4.1)."""
 IMPOSSIBLE = 30.0
 """Multiple, or part, of that mass moment beyond which there is no leg."""
-EXPLAINED = 0.7
-"""Share of the torque's power that rigid body and friction must explain before a joint's torque is
-compared."""
-NOTHING = 1e-4
-"""Least scale that is compared. No unit is as far from N·m: the channels contradict each other in
-another way."""
 LOOP_EXPLAINS = 0.8
 """Share of the torque's power that a position loop must explain before its gain is compared."""
 LARGEST_ANGLE_RAD = np.pi
@@ -59,24 +63,45 @@ def angle_unit_faults(motion: Motion) -> Iterator[Fault]:
     """Yield angles in degrees or another unit: far beyond their set-point or a joint's range."""
     for j, name in enumerate(motion.joints):
         q = motion.q[motion.valid, j]
-        factor = _times_set_point(motion, j)
+        times = _times_set_point(motion, j)
         channel = column(motion, j, "angle")
-        if factor and _is_a_unit(factor):
+        if times and _is_a_unit(times):
+            factor = times
             # There are 57.3 degrees in a radian; a drive that lags changes the ratio a little.
-            unit = "degrees" if 40 < factor < 80 else "another unit"
-            yield Fault(
-                motion.file,
-                channel,
-                f"{channel} is in {unit}: it moves {factor:.3g} times as far as its set-point, all"
-                f" along; set the channel's scale in {settings_of(motion)}",
+            unit = "degrees" if 40 < times < 80 else "another unit"
+            what = f"in {unit}: it moves {times:.3g} times as far as its set-point, all along"
+        elif (
+            len(q)
+            and motion.machine.joints[j].kind == "revolute"
+            and np.abs(q).max() > LARGEST_ANGLE_RAD
+        ):
+            factor, times = float(np.degrees(1.0)), None
+            what = (
+                f"not in radians, or its zero is lost: {the(name)} would reach"
+                f" {np.abs(q).max():.3g} rad, as if in degrees"
             )
-        elif len(q) and motion.machine.is_exoskeleton and np.abs(q).max() > LARGEST_ANGLE_RAD:
-            yield Fault(
-                motion.file,
-                channel,
-                f"{channel} is not in radians, or its zero is lost: {the(name)} would reach"
-                f" {np.abs(q).max():.3g} rad; if these are degrees, multiply by pi/180",
-            )
+        else:
+            continue
+        fault = Fault(
+            FaultKind.UNIT,
+            motion.file,
+            channel,
+            f"{channel} is {what}; {mend_in(motion, 'unit')}",
+            proof=_proof_of_angle(motion, j, factor),
+        )
+        # A set-point may be in another unit, too, and a machine that is no leg may turn over.
+        may_turn = not times and not motion.machine.is_exoskeleton
+        weaker = fault.proof is None or fault.proof.mended >= fault.proof.recorded
+        if fault.ruling is not Ruling.REFUTED and not (may_turn and weaker):
+            yield fault
+
+
+def _proof_of_angle(motion: Motion, joint: int, factor: float) -> Proof | None:
+    """Return what it changes to divide an angle by a factor."""
+    if motion.measured_angle is None:
+        return None
+    scales = np.where(np.arange(len(motion.joints)) == joint, 1.0 / factor, 1.0)
+    return by_motion(motion, mended(motion, angle=motion.measured_angle * scales))
 
 
 def _is_a_unit(factor: float) -> bool:
@@ -108,8 +133,38 @@ def _times_set_point(motion: Motion, joint: int) -> float | None:
     return times if follows else None
 
 
+@dataclass(frozen=True)
+class Scale:
+    """A joint's torque in a run, as a multiple of what a witness predicts."""
+
+    run: Averages
+    joint: int
+    factor: float
+    witness: str
+    proof: Proof | None
+
+    @property
+    def fault(self) -> Fault:
+        """The fault that it is."""
+        channel = column(self.run.motion, self.joint, "torque")
+        like = [
+            unit
+            for unit, size in TORQUE_UNITS.items()
+            if 1 / SAME_UNIT < self.factor / size < SAME_UNIT
+        ]
+        guess = f" ({' or '.join(like)}?)" if like else ""
+        return Fault(
+            FaultKind.UNIT,
+            self.run.motion.file,
+            channel,
+            f"{channel} is in another unit than N·m{guess}: a factor of {self.factor:.3g} against"
+            f" {self.witness}, all along; {mend_in(self.run.motion, 'unit')}",
+            proof=self.proof,
+        )
+
+
 def torque_unit_faults(runs: Sequence[Averages]) -> Iterator[Fault]:
-    """Yield torques in another unit than N·m, and runs at another scale than similar runs."""
+    """Yield torques of legs in another unit than N·m, and runs at another scale than others."""
     without_witness = []
     for run in runs:
         wrong = _against_the_drives(run)
@@ -117,19 +172,19 @@ def torque_unit_faults(runs: Sequence[Averages]) -> Iterator[Fault]:
             # A position loop is the better witness: it does not depend on what the joints carry.
             wrong = _against_the_other_joint(run)
             without_witness += [] if wrong else [run]
-        for j, (factor, witness) in wrong.items():
-            yield _torque_fault(run, j, factor, witness)
-    yield from _between_runs(without_witness)
+        yield from (scale.fault for scale in wrong)
+    yield from (scale.fault for scale in _between_runs(without_witness))
 
 
-def _against_the_drives(run: Averages) -> dict[int, tuple[float, str]] | None:
-    """Return the joints whose torque contradicts their position loops; None if one is unknown."""
+def _against_the_drives(run: Averages) -> list[Scale] | None:
+    """Return the torques that contradict their position loops; None if one is unknown."""
     ratios = [_torque_over_position_loop(run.motion, j) for j in range(2)]
-    wrong = {
-        j: (ratio, f"{the(name)}'s position loop")
-        for j, (name, ratio) in enumerate(zip(run.motion.joints, ratios, strict=True))
-        if ratio and not 1 / WRONG < ratio < WRONG
-    }
+    wrong = []
+    for j, (name, ratio) in enumerate(zip(run.motion.joints, ratios, strict=True)):
+        if ratio and not 1 / WRONG < ratio < WRONG:
+            # A knee in another unit has a shank that many times too heavy for the hip.
+            proof = _at_the_hip(run, 1 / ratio if j else ratio)
+            wrong.append(Scale(run, j, ratio, f"{the(name)}'s position loop", proof))
     return None if None in ratios and not wrong else wrong
 
 
@@ -157,83 +212,115 @@ def _torque_over_position_loop(motion: Motion, joint: int) -> float | None:
     return float(abs(multiples[0])) / stiffness if holds else None
 
 
-def _against_the_other_joint(run: Averages) -> dict[int, tuple[float, str]]:
-    """Return the joints whose torque is in another unit, by the shank that both drives carry."""
+def _against_the_other_joint(run: Averages) -> list[Scale]:
+    """Return the torques in another unit, by the shank that both drives carry."""
     moment, scale = shank(run)
+    if min(moment, scale) <= 0.0:
+        return []
     of_a_leg = run.motion.machine.is_exoskeleton
     # The weight of another machine's second link is unknown: its first joint's torque is compared.
     typical = SHANK_KG_M[run.motion.run] if of_a_leg else moment
-    if min(moment, scale) < NOTHING or any(
-        fit(run.joint_columns(j), run.torque[:, j])[0] > 1.0 - EXPLAINED for j in range(2)
-    ):
-        return {}
     by_knee, by_hip = moment / typical, scale * moment / typical
-    if 1 / WRONG_BETWEEN_JOINTS < scale < WRONG_BETWEEN_JOINTS:
+    proof = _at_the_hip(run, scale)
+    if 1 / WRONG < scale < WRONG or proof.ruling is not Ruling.VETO:
         # Both joints agree, so only an impossible leg shows that both are in another unit.
-        if 1 / IMPOSSIBLE < by_knee < IMPOSSIBLE:
-            return {}
-        return {j: (by_knee, "the weight of a leg") for j in range(2)}
+        agree = min(one.agreement for one in predictions(run)) > AGREES
+        if 1 / IMPOSSIBLE < by_knee < IMPOSSIBLE or not agree:
+            return []
+        return [Scale(run, j, by_knee, "the weight of a leg", None) for j in range(2)]
     first, second = run.motion.joints
     link = "shank" if of_a_leg else "link"
     # The joint that makes the shank less plausible is the one in another unit.
     if abs(np.log(by_knee)) > abs(np.log(by_hip)):
-        return {1: (1 / scale, f"{the(first)}, which carries the same {link}")}
-    return {0: (scale, f"{the(second)}, which carries the same {link}")}
+        return [Scale(run, 1, 1 / scale, f"{the(first)}, which carries the same {link}", proof)]
+    return [Scale(run, 0, scale, f"{the(second)}, which carries the same {link}", proof)]
 
 
 def shank(run: Averages) -> tuple[float, float]:
     """Return the shank's mass moment from the knee's torque, and its multiple at the hip.
 
-    Drag at the hip can leave the multiple undetermined, but a wrong unit makes the shank too heavy
-    for the hip.
-
     Parameters
     ----------
     run : Averages
-        Blocks of one run.
+        Blocks of one run of a leg.
 
     Returns
     -------
     tuple of float
-        Moment, kg·m, and how many times this shank the hip's torque carries: 1 where it explains
-        it.
+        Moment, kg·m, and how many times this shank the hip's torque carries.
     """
-    at_knee = fit(run.joint_columns(1), run.torque[:, 1])[1]
-    at_hip, torque = run.joint_columns(0), run.torque[:, 0]
+    at_knee, same_shank, others = _shank_at_the_hip(run)
+    with_shank = Columns(np.column_stack([same_shank, others.positive]), others.free)
+    return float(at_knee[1]), float(fit(with_shank, run.torque[:, 0])[0])
+
+
+def _shank_at_the_hip(run: Averages) -> tuple[NDArray, NDArray, Columns]:
+    """Return the knee's values, its shank's torque at the hip (m,) N·m, and the hip's columns."""
+    at_knee, at_hip = fit(run.columns(1), run.torque[:, 1]), run.columns(0)
     # X2 and X3 belong to the shank alone, so the knee's values predict its torque at the hip.
-    same_shank, others = at_hip[:, 1:3] @ at_knee[:2], at_hip[:, [0, 3, 4, 5, 6, 7]]
-    times = float(fit(np.column_stack([same_shank, others]), torque)[1][0])
-    # If the hip's own columns explain what this very shank leaves, its multiple counts as one.
-    if times < 1.0:
-        rest = torque - same_shank
-        residual = fit(others, rest)[0] * float(rest @ rest)
-        times = 1.0 if residual < (1.0 - EXPLAINED) * float(torque @ torque) else times
-    return float(at_knee[1]), times
+    own = Columns(np.delete(at_hip.positive, [1, 2], axis=1), at_hip.free)
+    return at_knee, at_hip.positive[:, 1:3] @ at_knee[:2], own
 
 
-def _between_runs(runs: Sequence[Averages]) -> Iterator[Fault]:
+def _at_the_hip(run: Averages, times: float) -> Proof:
+    """Return what it changes at the hip that it carries so many times the knee's shank."""
+    _, same_shank, others = _shank_at_the_hip(run)
+    torque = run.torque[:, 0]
+    recorded, scaled = (
+        Prediction(torque, part + predicted(others, torque - part))
+        for part in (same_shank, times * same_shank)
+    )
+    agreement = min(scaled.agreement, predictions(run)[1].agreement)
+    return Proof(recorded.unexplained, scaled.unexplained, agreement)
+
+
+def _between_runs(runs: Sequence[Averages]) -> list[Scale]:
     """Compare every two runs of a kind: one's parameters predict the torque of the other."""
-    for first, second in combinations(runs, 2):
-        if first.motion.run != second.motion.run:
-            continue
-        for j in range(2):
-            misfit, multiples = fit(first.joint_columns(j), first.torque[:, j])
-            factor = _times_predicted(second, multiples, j)
-            if misfit > 1.0 - EXPLAINED or 1 / WRONG < factor < WRONG:
-                continue
-            odd, like = (second, first) if _less_plausible(second, first) else (first, second)
-            times = factor if odd is second else 1 / max(factor, 1e-6)
-            whose = "leg" if odd.motion.machine.is_exoskeleton else "machine"
-            yield _torque_fault(
-                odd, j, times, f"{like.motion.file}, another run of the same {whose}"
-            )
+    apart = [
+        (first, second, j, factor, proof)
+        for first, second in combinations(runs, 2)
+        if first.motion.run == second.motion.run
+        for j in range(2)
+        for factor, proof in _times_predicted(first, second, j)
+    ]
+    contradictions = Counter(
+        (run.motion.file, j) for first, second, j, *_ in apart for run in (first, second)
+    )
+    scales: dict[tuple[str, int], Scale] = {}
+    for first, second, j, factor, proof in apart:
+        ones, others = (contradictions[run.motion.file, j] for run in (first, second))
+        # The run that contradicts more runs is the odd one.
+        is_second = _less_plausible(second, first) if ones == others else others > ones
+        odd, like, times = (second, first, factor) if is_second else (first, second, 1 / factor)
+        whose = "leg" if odd.motion.machine.is_exoskeleton else "machine"
+        witness = f"{like.motion.file}, another run of the same {whose}"
+        scales.setdefault((odd.motion.file, j), Scale(odd, j, times, witness, proof))
+    return list(scales.values())
 
 
-def _times_predicted(run: Averages, multiples: NDArray, joint: int) -> float:
-    """Return the run's torque as a multiple of the prediction by another run's parameters."""
-    predicted = run.joint_columns(joint) @ multiples
-    # A reversed torque has no factor; a tiny one keeps its reciprocal finite.
-    return max(float(predicted @ run.torque[:, joint] / max(predicted @ predicted, 1e-12)), 1e-6)
+def _times_predicted(
+    first: Averages, second: Averages, joint: int
+) -> Iterator[tuple[float, Proof]]:
+    """Yield the factor between a run's torque and its prediction by another run, with its proof.
+
+    A heavier load has other inertia and weight, and the same friction. So a factor counts only
+    where another body with the first run's friction explains far less.
+    """
+    columns, torque = second.columns(joint), second.torque[:, joint]
+    values = fit(first.columns(joint), first.torque[:, joint])
+    positive = values[: columns.positive.shape[1]]
+    whole, law = columns.split(values)
+    factor = float(fit(Columns(whole[:, np.newaxis], columns.free), torque)[0])
+    if factor == 0.0 or 1 / WRONG < factor < WRONG:
+        return
+    friction = columns.positive[:, -2:] @ positive[-2:]
+    body = Columns(columns.positive[:, :-2], columns.free)
+    other_load = Prediction(torque, friction + predicted(body, torque - friction))
+    scaled = torque / factor
+    same = Prediction(scaled, whole + predicted(law, scaled - whole))
+    proof = Proof(other_load.unexplained, same.unexplained, same.agreement)
+    if proof.ruling is Ruling.VETO:
+        yield factor, proof
 
 
 def _less_plausible(run: Averages, than: Averages) -> bool:
@@ -244,17 +331,3 @@ def _less_plausible(run: Averages, than: Averages) -> bool:
         return abs(float(np.log(max(shank(one)[0], 1e-6) / SHANK_KG_M[one.motion.run])))
 
     return distance(run) > distance(than)
-
-
-def _torque_fault(run: Averages, joint: int, factor: float, witness: str) -> Fault:
-    channel = column(run.motion, joint, "torque")
-    like = [
-        unit for unit, size in TORQUE_UNITS.items() if 1 / SAME_UNIT < factor / size < SAME_UNIT
-    ]
-    guess = f" ({' or '.join(like)}?)" if like else ""
-    return Fault(
-        run.motion.file,
-        channel,
-        f"{channel} is in another unit than N·m{guess}: a factor of {factor:.3g} against {witness},"
-        f" all along; set the channel's scale in {settings_of(run.motion)}",
-    )

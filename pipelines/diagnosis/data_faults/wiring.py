@@ -1,36 +1,34 @@
 """Find wrong wiring: channels of hip and knee exchanged, and reversed signs.
 
 The angles are compared with their set-points, where these were recorded. Then all channels are
-compared with the torque of a leg (``nonnegative_leg.py``): a wiring is wrong when another explains
+compared with the torque of a leg (``rigid_fit.py``): a wiring is wrong when another explains
 both joints far better.
 """
 
-from collections.abc import Iterator
-from itertools import product
+from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
+from pipelines.contracts.fault_kind import FaultKind
 from pipelines.contracts.joints import the
 from pipelines.diagnosis.data_faults.fault import WHOLE_ROW, Fault, column
-from pipelines.diagnosis.data_faults.nonnegative_leg import (
+from pipelines.diagnosis.data_faults.mends import mended
+from pipelines.diagnosis.data_faults.proof import MOST, Prediction, Proof, by_motion, compared
+from pipelines.diagnosis.data_faults.rigid_fit import (
     AS_RECORDED,
     EXCHANGED,
     KNEE_REVERSED,
     Averages,
     Reading,
-    cuff_misfit,
+    cuff_columns,
     fit,
+    joined,
+    predicted,
 )
 from pipelines.mechanics.motion import CUFFS, Motion
-from pipelines.mechanics.origin import settings_of
+from pipelines.mechanics.origin import mend_in
 
-FAR_BETTER = 0.5
-"""Factor by which the unexplained power must fall for each channel that is reported as wrong: more
-channels are less likely. Missing physics of a quarter of the torque changes it by a few tenths."""
-A_LIMB = 0.05
-"""Largest unexplained share of the cuffs' power at which they measure a limb, whatever explains
-more."""
 FOLLOWS = 0.9
 """Correlation of an angle with its set-point from which it follows it."""
 SIGN, SWAP = "reversed", "exchanged"
@@ -68,7 +66,9 @@ MIRROR_IMAGES: dict[Channels, str] = {
 
 def angle_faults(motion: Motion) -> Iterator[Fault]:
     """Yield angles that do not follow their own set-points: exchanged or reversed."""
-    if motion.reference is None or not np.isfinite(motion.reference[motion.valid]).all():
+    if motion.reference is None or motion.measured_angle is None:
+        return
+    if not np.isfinite(motion.reference[motion.valid]).all():
         return
     q, reference = motion.q[motion.valid], motion.reference[motion.valid]
     joints = q.shape[1]
@@ -80,7 +80,9 @@ def angle_faults(motion: Motion) -> Iterator[Fault]:
         own, best = alike[j, j], int(np.argmax(alike[j]))
         if own < -FOLLOWS:
             why = f"it moves against its set-point (correlation {own:.2f})"
-            yield _fault(motion, ((j, "angle"),), SIGN, why)
+            reversed_angle = np.where(np.arange(joints) == j, -1.0, 1.0) * motion.measured_angle
+            proof = by_motion(motion, mended(motion, angle=reversed_angle))
+            yield _fault(motion, ((j, "angle"),), SIGN, why, proof)
         elif (
             best != j
             and alike[j, best] > FOLLOWS
@@ -92,35 +94,98 @@ def angle_faults(motion: Motion) -> Iterator[Fault]:
         ):
             one, other = f"{alike[j, best]:.2f}", f"{alike[best, j]:.2f}"
             why = f"each follows the other's set-point (correlations {one} and {other})"
-            yield _fault(motion, ((j, "angle"), (best, "angle")), SWAP, why)
+            order = np.arange(joints)
+            order[[j, best]] = best, j
+            exchanged = mended(motion, angle=motion.measured_angle[:, order])
+            proof = by_motion(motion, exchanged, channels=2)
+            yield _fault(motion, ((j, "angle"), (best, "angle")), SWAP, why, proof)
 
 
-def wiring_faults(run: Averages) -> Iterator[Fault]:
-    """Yield channels that fit a leg only when exchanged or reversed."""
-    # Joints are fitted apart, so that 24 fits serve all combinations.
-    misfits: dict[tuple[Reading, int, int, float], float] = {}
-    for reading, joint in product((AS_RECORDED, KNEE_REVERSED, EXCHANGED), (HIP, KNEE)):
-        columns = run.joint_columns(joint, reading)
-        for channel, sign in product((HIP, KNEE), (1.0, -1.0)):
-            misfits[reading, joint, channel, sign] = fit(columns, sign * run.torque[:, channel])[0]
+def wiring_faults(runs: Sequence[Averages]) -> Iterator[Fault]:
+    """Yield channels that fit a leg only when exchanged or reversed, in all runs of a kind or one.
+
+    Parameters
+    ----------
+    runs : sequence of Averages
+        Runs of one kind of one leg.
+    """
+    judged = [Wirings(run) for run in runs]
+    wiring, proof = _best(lambda one: [pair for run in judged for pair in run.under(one)])
+    if wiring is not None:
+        yield from (_of_wiring(run.motion, wiring, proof) for run in runs)
+        return
+    if len(runs) < 2:
+        return
+    for k, run in enumerate(runs):
+        by_others = Wirings(run, [*runs[:k], *runs[k + 1 :]])
+        wiring, proof = _best(by_others.under)
+        if wiring is not None:
+            yield _of_wiring(run.motion, wiring, proof)
+
+
+def _best(
+    under: Callable[[Wiring], Sequence[Prediction]],
+) -> tuple[Wiring | None, Proof]:
+    """Return the wiring that removes most of the error, if any, with its proof."""
+    as_recorded = under(WIRINGS[0])
 
     def misfit(wiring: Wiring) -> float:
-        reading, channels, signs, *_ = wiring
-        return sum(misfits[reading, j, channels[j], signs[j]] for j in (HIP, KNEE)) / 2
+        return sum(one.unexplained for one in under(wiring)) / MOST ** len(wiring[3])
 
-    as_recorded = WIRINGS[0]
-    best = min(WIRINGS, key=lambda wiring: misfit(wiring) / FAR_BETTER ** len(wiring[3]))
-    if best is as_recorded:
-        return
-    why = (
-        f"rigid body and friction then leave {_percent(misfit(best))} of the torques' power"
-        f" unexplained, {_percent(misfit(as_recorded))} as recorded"
-    )
-    mirror = MIRROR_IMAGES.get(best[3])
-    if best[4] == SIGN and mirror:
-        mirror = mirror.replace("the hip", the(run.motion.joints[HIP]))
-        why += f" (reversing {mirror} instead gives the same)"
-    yield _fault(run.motion, best[3], best[4], why)
+    best = min(WIRINGS, key=misfit)
+    # An angle takes part in the torque of both joints.
+    torques = {joint for joint, quantity in best[3] if quantity == "torque"}
+    at = torques if all(quantity == "torque" for _, quantity in best[3]) else {HIP, KNEE}
+    chosen = [k for k in range(len(as_recorded)) if k % 2 in at or not best[3]]
+    mended = under(best)
+    proof = compared([as_recorded[k] for k in chosen], [mended[k] for k in chosen], len(best[3]))
+    return (best if best[3] and proof.removes_most else None), proof
+
+
+class Wirings:
+    """The torque of both joints of a run under each wiring, and its prediction.
+
+    A body fitted to one half of the run predicts the other half; where other runs are given, one
+    fitted to these, as recorded.
+    """
+
+    def __init__(self, run: Averages, others: Sequence[Averages] = ()) -> None:
+        self.run = run
+        self.bodies = [
+            fit(
+                joined([one.columns(j) for one in others]),
+                np.concatenate([one.torque[:, j] for one in others]),
+            )
+            for j in (HIP, KNEE)
+            if others
+        ]
+        self.known: dict[tuple[Reading, int, int, float], Prediction] = {}
+
+    def under(self, wiring: Wiring) -> list[Prediction]:
+        """Return the predictions at hip and knee under a wiring."""
+        reading, channels, signs, *_ = wiring
+        return [self._one(reading, j, channels[j], signs[j]) for j in (HIP, KNEE)]
+
+    def _one(self, reading: Reading, joint: int, channel: int, sign: float) -> Prediction:
+        key = reading, joint, channel, sign
+        # Joints are fitted apart, so that 24 fits serve all wirings.
+        if key not in self.known:
+            torque, columns = sign * self.run.torque[:, channel], self.run.columns(joint, reading)
+            if self.bodies:
+                # Zeros differ from run to run.
+                whole, law = columns.split(self.bodies[joint])
+                self.known[key] = Prediction(torque, whole + predicted(law, torque - whole))
+            else:
+                self.known[key] = Prediction(torque, predicted(columns, torque))
+        return self.known[key]
+
+
+def _of_wiring(motion: Motion, wiring: Wiring, proof: Proof) -> Fault:
+    mirror = MIRROR_IMAGES.get(wiring[3], "") if wiring[4] == SIGN else ""
+    if mirror:
+        mirror = mirror.replace("the hip", the(motion.joints[HIP]))
+        mirror = f"reversing {mirror} instead gives the same"
+    return _fault(motion, wiring[3], wiring[4], mirror, proof)
 
 
 def cuff_faults(run: Averages) -> Iterator[Fault]:
@@ -134,36 +199,41 @@ def cuff_faults(run: Averages) -> Iterator[Fault]:
         "the sign of the thigh's is reversed": run.cuffs * [[-1.0], [1.0]],
         "the sign of the shank's is reversed": run.cuffs * [[1.0], [-1.0]],
     }
-    as_recorded = cuff_misfit(run, run.cuffs)
-    misfits = {what: cuff_misfit(run, cuffs) for what, cuffs in readings.items()}
-    best = min(misfits, key=misfits.__getitem__)
-    if as_recorded > A_LIMB and misfits[best] < FAR_BETTER**2 * as_recorded:
-        chosen = [
-            cuff
-            for cuff in CUFFS
-            if "all" in best or "exchanged" in best or cuff.split("_")[0] in best
-        ]
-        yield Fault(
-            run.motion.file,
-            f"{chosen[0]}_force_y_n",
-            f"cuff forces fit no limb, unless {best} (swapped or reversed sensors, {len(chosen)} of"
-            f" them): then {_percent(misfits[best])} of their torque's power is unexplained, not"
-            f" {_percent(as_recorded)}; check the sensors' addresses and axes",
-        )
-
-
-def _fault(motion: Motion, channels: Channels, how: str, why: str) -> Fault:
-    columns = [column(motion, *channel) for channel in channels]
-    names, settings = " and ".join(columns), settings_of(motion)
-    return Fault(
-        motion.file,
-        columns[0] if len(columns) == 1 else WHOLE_ROW,
-        f"the sign of {names} is reversed, all along: {why}; reverse it in {settings}, if every run"
-        " has it, and in this recording"
-        if how == SIGN
-        else f"{names} are swapped, all along: {why}; exchange the joints in {settings}",
+    as_recorded = _limb(run, run.cuffs)
+    limbs = {what: _limb(run, cuffs) for what, cuffs in readings.items()}
+    best = min(limbs, key=lambda what: limbs[what].unexplained)
+    proof = compared([as_recorded], [limbs[best]], channels=2)
+    if not proof.removes_most:
+        return
+    chosen = [
+        cuff for cuff in CUFFS if "all" in best or "exchanged" in best or cuff.split("_")[0] in best
+    ]
+    yield Fault(
+        FaultKind.CUFFS,
+        run.motion.file,
+        f"{chosen[0]}_force_y_n",
+        f"cuff forces fit no limb, unless {best} (swapped or reversed sensors, {len(chosen)} of"
+        " them); check the sensors' addresses and axes",
+        proof=proof,
     )
 
 
-def _percent(share: float) -> str:
-    return f"{100 * share:.2g} %"
+def _limb(run: Averages, cuffs: NDArray) -> Prediction:
+    """Return the torque of the cuffs on a limb, and the torque that a limb predicts."""
+    columns, torque = cuff_columns(run, cuffs)
+    return Prediction(torque, columns.torque(fit(columns, torque)))
+
+
+def _fault(motion: Motion, channels: Channels, how: str, why: str, proof: Proof | None) -> Fault:
+    columns = [column(motion, *channel) for channel in channels]
+    names = " and ".join(columns)
+    because = f": {why}" if why else ""
+    return Fault(
+        FaultKind.SIGN if how == SIGN else FaultKind.SWAP,
+        motion.file,
+        columns[0] if len(columns) == 1 else WHOLE_ROW,
+        f"the sign of {names} is reversed, all along{because}; {mend_in(motion, 'sign')}"
+        if how == SIGN
+        else f"{names} are swapped, all along{because}; {mend_in(motion, 'column')}",
+        proof=proof,
+    )

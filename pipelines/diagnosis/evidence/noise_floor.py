@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import uniform_filter1d
 
 from pipelines.diagnosis.evidence.observed_run import Run
+from pipelines.signals.sampling import whole_periods
 
 
 @dataclass(frozen=True)
@@ -73,8 +74,10 @@ def scatter(run: Run, residual: NDArray) -> NDArray:
         N·m; NaN where a sample is not usable.
     """
     # With less than two periods, some phases of the motion would have no difference.
-    period = run.motion.period_s
-    if not period or not len(run.time) or run.time[-1] - run.time[0] < 2 * period:
+    motion = run.motion
+    period, step_s = motion.period_s, 1.0 / motion.sample_rate_hz
+    lasts = float(motion.time[-1] - motion.time[0])
+    if not period or not len(run.time) or whole_periods(lasts, step_s, period) < 2:
         return np.zeros((0, residual.shape[1]))
     width = run.block.decimation / run.motion.sample_rate_hz
     shift = period / width

@@ -27,6 +27,7 @@ def caveats(d: Diagnosis) -> list[str]:
     doubtful = [] if d.data.spoilt else [*_high_floor(d), *d.upside_down]
     return [
         *known,
+        *(f"{f.file}, {f.channel}: {f.in_words}" for f in d.data.doubts),
         *_at_ends(d),
         *_size_may_be_zero(d),
         *_default_length(d),

@@ -20,8 +20,8 @@ def summary(d: Diagnosis, causes: list[Cause], remainder: dict[str, Any] | None)
         return f"Acquisition, not physics: {_in_short(d.data.spoilt[0], d)}."
     text = finding_in_words(d, causes, remainder)
     text += _noise_without_periods(d)
-    if d.data.faults:
-        text += f" Faults of acquisition were found as well: {_in_short(d.data.faults[0], d)}."
+    if d.data.left_out:
+        text += f" Faults of acquisition were found as well: {_in_short(d.data.left_out[0], d)}."
     return text
 
 
@@ -58,7 +58,7 @@ def _in_short(fault: Fault, d: Diagnosis) -> str:
     others = len(d.data.faults) - 1
     plural = "s" * (others > 1)
     more = f" (and {others} more fault{plural}, in data_faults of verdict.json)" if others else ""
-    return f"{fault.file}, {fault.channel}: {fault.what}{more}"
+    return f"{fault.file}, {fault.channel}: {fault.in_words}{more}"
 
 
 def finding_in_words(d: Diagnosis, causes: list[Cause], remainder: dict[str, Any] | None) -> str:

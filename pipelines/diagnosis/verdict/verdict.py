@@ -64,8 +64,17 @@ def verdict(d: Diagnosis) -> dict[str, Any]:
         ],
         "causes": causes,
         "data_faults": [
-            {"file": f.file, "channel": f.channel, "what": f.what} for f in d.data.faults
+            {
+                "file": f.file,
+                "channel": f.channel,
+                "what": f.in_words,
+                "kind": f.kind,
+                "veto": f.is_veto,
+                "proof": asdict(f.proof) if f.proof else None,
+            }
+            for f in d.data.faults
         ],
+        "accepted": sorted({f.kind for f in d.data.faults if f.accepted}),
         "residual": remainder,
         "runs": sorted({run.motion.run for run in d.validate}),
         "noise_floor_from": floor_from(d),

@@ -20,11 +20,18 @@ from pipelines.importing.guess.joints import (
 from pipelines.importing.guess.names import Meaning, meaning
 from pipelines.importing.guess.parts import Join, opened, runs_to_join
 from pipelines.importing.guess.proposal import Proposal
-from pipelines.importing.guess.time import TimeGuess, guess_time, runs_of, write_time
+from pipelines.importing.guess.time import (
+    TimeGuess,
+    guess_time,
+    runs_of,
+    settled,
+    write_time,
+)
 from pipelines.importing.quantities.numbers import numbers, same_stamps, whole_nanoseconds
 from pipelines.importing.quantities.wraparound import fill_value
 from pipelines.importing.sources.source import Columns, Source
 from pipelines.importing.time import clock
+from pipelines.importing.time.held import are_held
 from pipelines.importing.time.period import repeats_after
 from pipelines.settings.units import unit_named
 
@@ -56,9 +63,9 @@ def propose(paths: Sequence[Path]) -> Proposal:
         _check_columns(path, source, join)
     clocks = _onto_one_clock(source, time.column, columns)
     clocks |= _into_blank_rows(names, time.column, columns)
-    columns[time.column] = time.stamps(columns[time.column])
+    columns[time.column] = time.stamps(*(columns[name] for name in time.columns))
     # Within one run, because integrals and fits across a restart of the clock mean nothing.
-    run = max(runs_of(columns[time.column], time.unit), key=len)
+    run = max(runs_of(columns[time.column], time.count_s), key=len)
     rows = len(columns[time.column])
     # Columns of another length are constants, or have a clock of their own.
     of_run = {name: values[run.rows] for name, values in columns.items() if len(values) == rows}
@@ -72,6 +79,8 @@ def propose(paths: Sequence[Path]) -> Proposal:
                 "no angle column found, by name or as the integral of another column, among"
                 f" {_in_short(source.names)}; write the map by hand (docs/import.md)"
             )
+    clock_s, time = time.count_s, settled(time, joints, of_run, run.time_s)
+    run = replace(run, time_s=run.time_s * (time.count_s / clock_s))
     proposal = Proposal()
     proposal.remark(
         f"A map for {', '.join(path.name for path in paths)}, proposed by `exoid import --guess`."
@@ -82,9 +91,9 @@ def propose(paths: Sequence[Path]) -> Proposal:
     if join is not None:
         proposal.table("[source]", "source")
         proposal.key("join", list(join.patterns), "files of one run; their columns differ")
-    write_time(proposal, time)
-    used = {time.column}
     joints, resting = moving(joints, of_run)
+    write_time(proposal, time, [name for joint in joints for name in _held(joint, of_run)])
+    used = {*time.columns}
     alone = len(joints) == 1
     for number, joint in enumerate(joints):
         used |= set(write_joint(proposal, number, joint, of_run, run.time_s, alone, clocks, limits))
@@ -92,10 +101,20 @@ def propose(paths: Sequence[Path]) -> Proposal:
     if resting:
         rests = f"{', '.join(resting)} rest while others move, and are left out"
         proposal.doubt("joint", f"{rests}; with them, name their columns too")
+    if not time.unit_sure and any("velocity" in joint.columns for joint in joints):
+        proposal.doubt("joint.velocity.unit", "follows from the unit of time, which is unsure")
     _write_geometry(proposal, joints)
     _write_recordings(proposal, paths, [_period(path, join, time, joints) for path in paths])
     _write_unused(proposal, [name for name in source.names if name not in used], columns)
     return proposal
+
+
+def _held(joint: JointColumns, columns: Mapping[str, NDArray]) -> list[str]:
+    """Return the columns of a joint's angle and torque whose values are held between new ones."""
+    needed = [
+        joint.columns[name] for name in ("angle", joint.drive) if name and name in joint.columns
+    ]
+    return [m.column for m in needed if are_held(columns[m.column].astype(float))]
 
 
 def _typed_columns(source: Source) -> tuple[Columns, dict[str, str]]:
@@ -265,16 +284,17 @@ def _period(
     with about(path):
         source = opened(path, join)
         own = [source.clocks[name] for name in names if name in source.clocks]
-        columns = source.load([time.column, *names, *own])
+        columns = source.load([*time.columns, *names, *own])
     _onto_one_clock(source, time.column, columns)
     motion = {name: _numeric(columns[name]) for name in names}
-    logged = columns[time.column]
-    stamps = time.stamps(whole_nanoseconds(logged) if time.unit == "iso8601" else _numeric(logged))
+    logged = (columns[name] for name in time.columns)
+    as_numbers = whole_nanoseconds if time.unit == "iso8601" else _numeric
+    stamps = time.stamps(*map(as_numbers, logged))
     for values in (stamps, *motion.values()):
         if values.dtype.kind not in "iuf" or len(values) != len(stamps):
             return None
     with about(path):
-        run = max(runs_of(stamps, time.unit), key=len, default=None)
+        run = max(runs_of(stamps, time.count_s), key=len, default=None)
     if run is None:
         return None
     of_run = {name: values[run.rows] for name, values in motion.items()}

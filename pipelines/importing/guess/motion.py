@@ -14,6 +14,8 @@ FROM_NAME = "from its name"
 """Reason for a unit that is in the name of its column."""
 NEAR = 0.12
 """Largest relative error of a slope, as drives filter their velocities."""
+EXACT = 0.02
+"""Largest relative error of a slope that shows a unit for sure."""
 CLEAR = 0.7
 """Least share of the variance that angle and velocity share if they are of one joint."""
 VELOCITY_OF = {
@@ -121,10 +123,12 @@ def _from_slope(
     # A pair with the angle's own unit comes first: it changes the least.
     same = [pair for pair in fitting if pair[0] == unit]
     if same:
-        in_units = f"integrates to {sign * _turns(slope, *same[0]):.4g} {explained}"
-        # Units of which neither is known agree as well in degrees as in radians.
-        known = sure or velocity_named is not None
-        return Units(unit, why, sure, same[0][1], in_units, known, sign)
+        turns = _turns(slope, *same[0])
+        in_units = f"integrates to {sign * turns:.4g} {explained}"
+        # A log keeps the factor between its units; a drive's filter changes it a little. Units of
+        # which neither is known agree as well in degrees as in radians.
+        certain = bool(velocity_named) or (sure and abs(turns - 1.0) < EXACT)
+        return Units(unit, why, sure, same[0][1], in_units, certain, sign)
     if fitting and not sure:
         other, velocity = fitting[0]
         why = f"fits the velocity, which {reason}"
@@ -136,6 +140,25 @@ def _from_slope(
         return Units(unit, why, sure, velocity_named, reason, False, sign, ratio)
     velocity = velocity_named or VELOCITY_OF[unit]
     return Units(unit, why, sure, velocity, f"{reason}, which no units explain", False, sign)
+
+
+def factors(slope: float, angle: str | None, velocity: str | None) -> list[float]:
+    """Return a velocity's integral per angle in each pair of units that they may have.
+
+    Parameters
+    ----------
+    slope : float
+        Integral of the velocity per unit of angle, as logged.
+    angle, velocity : str or None
+        Their units; None where any that is usual may be.
+    """
+    return [
+        _turns(slope, one, other)
+        for one in ([angle] if angle else ANGLES)
+        for other in ([velocity] if velocity else VELOCITIES)
+        if (UNITS[one].dimension, UNITS[other].dimension)
+        in (("angle", "angular velocity"), ("length", "velocity"))
+    ]
 
 
 def _turns(slope: float, unit: str, velocity: str) -> float:

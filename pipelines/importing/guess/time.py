@@ -1,20 +1,25 @@
 """Choose the column of the clock, and its unit."""
 
 import itertools
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from pipelines.importing.guess.motion import FROM_NAME
+from pipelines.importing.guess.joints import JointColumns
+from pipelines.importing.guess.motion import CLEAR, EXACT, FROM_NAME, factors
 from pipelines.importing.guess.names import Meaning
 from pipelines.importing.guess.proposal import Proposal
+from pipelines.importing.quantities.consistency import integral_agreement
+from pipelines.importing.quantities.numbers import are_whole
 from pipelines.importing.time import clock
 from pipelines.settings.units import UNITS
 
 ADVANCES = 0.9
 """Least share of the steps of a clock that go forward."""
+LONG = ("min", "h", "d")
+"""Units that a clock with decimals may have, though few do."""
 USUAL = 2.0
 """Factor on the median within which stamps of a coarse clock are usual, in rows and in distance."""
 
@@ -34,23 +39,48 @@ class TimeGuess:
     """Rate of uniform rows, where the clock is too coarse; else None."""
     pause_s: float = 0.0
     """Longest step of a coarse clock without rows, s."""
+    scale: float = 1.0
+    """Units in a count of the stamps."""
+    others: tuple[tuple[str, float], ...] = ()
+    """Units and scales that give a usual rate, too."""
+    plus: str | None = None
+    """Column of the fractions of a second."""
+    plus_unit: str = "ns"
+    rivals: tuple[str, ...] = ()
+    """Other clocks of the log, with other times."""
 
-    def stamps(self, values: NDArray) -> NDArray:
+    @property
+    def columns(self) -> list[str]:
+        """The columns of the clock."""
+        return [self.column] if self.plus is None else [self.column, self.plus]
+
+    @property
+    def count_s(self) -> float:
+        """Duration of a count of the stamps, s."""
+        if self.plus is not None:
+            return UNITS[self.plus_unit].factor
+        return UNITS[self.unit].factor * self.scale
+
+    def stamps(self, values: NDArray, plus: NDArray | None = None) -> NDArray:
         """Return the stamps of rows.
 
         Parameters
         ----------
         values : (n,) array
             The clock's column.
+        plus : (n,) array, optional
+            The column of the fractions.
 
         Returns
         -------
         (n,) array
             In the clock's unit.
         """
+        if plus is not None:
+            return _together(values, plus, self.plus_unit)
         if self.rate_hz is None:
             return values
-        return np.arange(len(values)) / (self.rate_hz * UNITS[self.unit].factor)
+        return np.arange(len(values)) / (self.rate_hz * self.count_s)
 
 
 def guess_time(
@@ -72,6 +102,9 @@ def guess_time(
     TimeGuess or None
         None where no column is a clock.
     """
+    of_two = _of_two_columns(columns)
+    if of_two is not None:
+        return of_two
     advancing = [m for m in meanings if _advances(columns[m.column], m.quantity == "time")]
     coarse = [
         m
@@ -87,8 +120,61 @@ def guess_time(
     for meaning in sorted(candidates, key=lambda m: m.unit is None):
         guess = _guess(meaning, columns[meaning.column].astype(float), meaning in coarse, typed)
         if guess is not None:
-            return guess
+            clocks = [(m.column, _unit(m, typed) or guess.unit) for m in named + coarse]
+            return replace(guess, rivals=tuple(_rivals(guess, clocks, columns)))
     return None
+
+
+def _of_two_columns(columns: Mapping[str, NDArray]) -> TimeGuess | None:
+    """Return the clock of a log that has whole seconds and their fractions in two columns."""
+    whole = {
+        name: values
+        for name, values in columns.items()
+        if values.dtype.kind in "iu" and len(values) > 9
+    }
+    for seconds, values in whole.items():
+        steps = np.diff(values.astype(float))
+        if not (steps.any() and np.isin(steps, (0.0, 1.0)).all() and np.mean(steps) < 0.5):
+            continue
+        for name, fractions in whole.items():
+            full = next((unit for unit in ("us", "ns") if _fills(fractions, unit)), None)
+            # The fractions start over where a second is full, and nowhere else.
+            if full and np.array_equal(np.diff(fractions.astype(float)) < 0.0, steps > 0.0):
+                step = clock.period(_together(values, fractions, full).astype(float))
+                why = f"seconds, with fractions in {name}: {_rate_hz(step, full):.4g} Hz"
+                return TimeGuess(
+                    seconds, "s", why, True, True, None, False, plus=name, plus_unit=full
+                )
+    return None
+
+
+def _fills(fractions: NDArray, unit: str) -> bool:
+    """Return whether whole numbers (n,) are fractions of a second in a unit."""
+    full = 1.0 / UNITS[unit].factor
+    return bool(len(fractions)) and 0 <= fractions.min() and 0.5 * full < fractions.max() < full
+
+
+def _together(seconds: NDArray, fractions: NDArray, unit: str) -> NDArray:
+    """Return the stamps of seconds (n,) and their fractions, in the unit of these."""
+    return seconds.astype(np.int64) * round(1.0 / UNITS[unit].factor) + fractions.astype(np.int64)
+
+
+def _rivals(
+    guess: TimeGuess, clocks: Sequence[tuple[str, str]], columns: Mapping[str, NDArray]
+) -> Iterator[str]:
+    """Yield the other named clocks, with their units, that have other times than the guess."""
+    time_s = columns[guess.column].astype(float) * guess.count_s
+    for name, unit in clocks:
+        other_s = columns[name].astype(float) * UNITS[unit].factor
+        if name == guess.column or len(other_s) != len(time_s):
+            continue
+        # Clocks of two devices are apart by a little, or drift. A date, and the time since the log
+        # began, are far apart, and always by the same.
+        apart, period = other_s - time_s, clock.period(time_s)
+        if np.nanmax(apart) - np.nanmin(apart) > 0.5 * period or (
+            0.01 * period < abs(np.nanmedian(apart)) < 1.0
+        ):
+            yield name
 
 
 def _guess(
@@ -96,35 +182,127 @@ def _guess(
 ) -> TimeGuess | None:
     """Return a column as a clock; None where no unit gives a usual rate."""
     step = _step(values, coarse)
-    fitting = clock.usual_units(step)
-    known = _unit(meaning, typed)
-    if known is None and not fitting:
+    known, epoch = _unit(meaning, typed), _epoch(values, step)
+    fitting = [(known, 1.0)] if known else _scales(values, step)
+    if epoch and not known:
+        fitting = [epoch[:2], *(one for one in fitting if one != epoch[:2])]
+    if not fitting:
         return None
-    # Usual rates span three decades, so that mostly one unit fits.
-    unit = known or fitting[0]
-    rate_hz = _rate_hz(step, unit)
-    is_usual, is_named = unit in clock.usual_units(step, [unit]), meaning.quantity == "time"
+    unit, scale = fitting[0]
+    count_s = UNITS[unit].factor * scale
+    rate_hz = 1.0 / (step * count_s)
+    is_usual = clock.SLOWEST_HZ <= rate_hz <= clock.FASTEST_HZ
+    is_named = meaning.quantity == "time"
+    others = () if known or epoch else tuple(fitting[1:])
     if known:
         by_type = {"iso8601": "dates written out", "ns": "durations, here in whole ns"}
         why = f"{by_type.get(typed.get(meaning.column, ''), FROM_NAME)}: {rate_hz:.4g} Hz"
+    elif epoch:
+        why = f"{epoch[2]}: {rate_hz:.4g} Hz"
     else:
         why = f"steps of {step:.4g} are {rate_hz:.4g} Hz in {unit}, and no rate in another"
+        if others:
+            rates = (f"{1.0 / (step * UNITS[u].factor * k):.4g} Hz in {k:g} {u}" for u, k in others)
+            why = (
+                f"steps of {step:.4g} are {rate_hz:.4g} Hz in {scale:g} {unit}, {', '.join(rates)}"
+            )
     if not is_named:
         why += "; no name shows which column is the time"
     if not is_usual:
-        why += f", no usual rate: is it {' or '.join(fitting) or 'another column'}?"
-    wraps_at, restarts = _breaks(values, unit)
+        usual = clock.usual_units(step)
+        why += f", no usual rate: is it {' or '.join(usual) or 'another column'}?"
+    wraps_at, restarts = _breaks(values, count_s)
     return TimeGuess(
         meaning.column,
         unit,
         why,
         sure=is_named,
-        unit_sure=is_named and is_usual,
+        unit_sure=is_named
+        and is_usual
+        and not others
+        and (unit not in LONG or bool(known or epoch)),
         wraps_at=wraps_at,
         restarts=restarts,
         rate_hz=rate_hz if coarse else None,
-        pause_s=_longest_pause(values) * UNITS[unit].factor if coarse else 0.0,
+        pause_s=_longest_pause(values) * count_s if coarse else 0.0,
+        scale=scale,
+        others=others,
     )
+
+
+def _scales(values: NDArray, step: float) -> list[tuple[str, float]]:
+    """Return units, and scales, of a clock (n,) of such a step that give a usual rate.
+
+    Whole numbers may count ticks of any power of ten of a second: several powers give a usual
+    rate, so that nothing but a name, a date or the motion decides.
+    """
+    tried = [(unit, 1.0) for unit in ("s", "ms", "us", "ns")]
+    if are_whole(values):
+        tried += [("100ns", 1.0), ("ms", 0.1), ("us", 10.0), ("ms", 10.0), ("s", 0.1), ("ns", 10.0)]
+    else:
+        tried += [(unit, 1.0) for unit in LONG]
+    usual = [one for one in tried if clock.usual_units(step * one[1], [one[0]])]
+    # A clock with decimals is hardly one in minutes, if it may be one in seconds.
+    return usual if are_whole(values) else usual[:1]
+
+
+def _epoch(values: NDArray, step: float) -> tuple[str, float, str] | None:
+    """Return unit, scale and words of a clock whose first stamp is a date of our time, if any."""
+    known = values[np.isfinite(values)]
+    dates = (
+        *(
+            (unit, 0.9e9 / UNITS[unit].factor, 2.6e9 / UNITS[unit].factor, "dates since 1970")
+            for unit in ("s", "ms", "us", "ns")
+        ),
+        ("s", 2.9e9, 4.7e9, "seconds since 1904, as LabVIEW counts"),
+        ("100ns", 1.25e17, 1.45e17, "a FILETIME, since 1601"),
+        ("100ns", 6.3e17, 6.6e17, "ticks of .NET, since the year 1"),
+        ("d", 7.2e5, 7.6e5, "days of MATLAB's datenum"),
+        ("d", 3.6e4, 6e4, "days of a spreadsheet, since 1900"),
+    )
+    for unit, least, most, words in dates:
+        if len(known) and least < known[0] < most and clock.usual_units(step, [unit]):
+            return unit, 1.0, words
+    return None
+
+
+def settled(
+    guess: TimeGuess,
+    joints: Sequence[JointColumns],
+    columns: Mapping[str, NDArray],
+    time_s: NDArray,
+) -> TimeGuess:
+    """Return the clock in the unit in which a velocity integrates to its angle.
+
+    Parameters
+    ----------
+    guess : TimeGuess
+        The clock.
+    joints : sequence of JointColumns
+        The joints.
+    columns : mapping of str to (n,) array
+        Columns of a run.
+    time_s : (n,) array
+        Its times by this guess, s.
+    """
+    for joint in joints if guess.others else ():
+        if not {"angle", "velocity"} <= joint.columns.keys():
+            continue
+        angle, velocity = (joint.columns[name] for name in ("angle", "velocity"))
+        agreement = integral_agreement(
+            time_s, *(columns[m.column].astype(float) for m in (angle, velocity))
+        )
+        if agreement is None or agreement.explained < CLEAR:
+            continue
+        for unit, scale in ((guess.unit, guess.scale), *guess.others):
+            slope = abs(agreement.slope) * UNITS[unit].factor * scale / guess.count_s
+            if any(
+                abs(factor - 1.0) < EXACT for factor in factors(slope, angle.unit, velocity.unit)
+            ):
+                named = guess.sure and bool(angle.unit and velocity.unit)
+                why = f"{guess.why}; in {scale:g} {unit} the velocity integrates to the angle"
+                return replace(guess, unit=unit, scale=scale, why=why, unit_sure=named)
+    return guess
 
 
 def _unit(meaning: Meaning, typed: Mapping[str, str]) -> str | None:
@@ -152,7 +330,7 @@ def _finer(
         if any(
             # The rates of two clocks of the same rows differ by less than 10 %. A finer clock must
             # not start over: a coarse one never goes back.
-            abs(hz / rate - 1.0) < 0.1 and not _breaks(values, unit)[1]
+            abs(hz / rate - 1.0) < 0.1 and not _breaks(values, UNITS[unit].factor)[1]
             for unit, hz in own
             for rate in rates
         ):
@@ -173,9 +351,12 @@ def _rate_hz(step: float, unit: str) -> float:
     return 1.0 / (step * UNITS[unit].factor)
 
 
-def write_time(proposal: Proposal, guess: TimeGuess) -> None:
-    """Write the clock's table."""
+def write_time(proposal: Proposal, guess: TimeGuess, held: Sequence[str]) -> None:
+    """Write the clock's table; ``held`` are columns that repeat values between new ones."""
     proposal.table("[time]", "time")
+    if held:
+        why = f"{', '.join(held)} repeat their values between new ones"
+        proposal.key("keep", "new", why)
     if guess.rate_hz is not None:
         why = f"several rows have one stamp of {guess.column}; taken for uniform, in {guess.unit}"
         if guess.pause_s:
@@ -187,11 +368,19 @@ def write_time(proposal: Proposal, guess: TimeGuess) -> None:
         why += ", but starts over"
     if not guess.sure:
         why += ", as no other does"
-    proposal.key("column", guess.column, why, guess.sure)
+    if guess.rivals:
+        why += f", and so does {' and '.join(guess.rivals)}: name it as `time` of its channels"
+    proposal.key("column", guess.column, why, guess.sure and not guess.rivals)
     proposal.key("unit", guess.unit, guess.why, guess.unit_sure)
-    if guess.wraps_at:
+    if guess.plus is not None:
+        proposal.key("plus", guess.plus, "starts over with each second")
+        proposal.key("plus_unit", guess.plus_unit)
+    if guess.scale != 1.0:
+        proposal.key("scale", guess.scale, "as of the unit", guess.unit_sure)
+    # Times of day go on after midnight by themselves.
+    if guess.wraps_at and guess.unit != "iso8601":
         proposal.key("wraps_at", guess.wraps_at, "goes back where such a counter is full")
-    elif guess.restarts:
+    elif guess.restarts and not guess.wraps_at:
         why = 'the clock starts over; "split" makes a recording of each run'
         proposal.key("restarts", "longest", why, sure=False)
 
@@ -260,11 +449,12 @@ def _step(values: NDArray, coarse: bool) -> float:
     return clock.period(values)
 
 
-def _breaks(values: NDArray, unit: str) -> tuple[float | None, bool]:
+def _breaks(values: NDArray, count_s: float) -> tuple[float | None, bool]:
     """Return the modulus of a clock that wraps around, if any, and whether it starts over."""
-    runs = runs_of(values, unit)
+    runs = runs_of(values, count_s)
+    step = clock.period(values)
     full = [
-        clock.full_register(values[before.rows[-1]], values[after.rows[0]])
+        clock.full_clock(values[before.rows[-1]], values[after.rows[0]], step, count_s)
         for before, after in itertools.pairwise(runs)
     ]
     # A register is full at the same reading each time; breaks that differ are restarts.
@@ -273,8 +463,8 @@ def _breaks(values: NDArray, unit: str) -> tuple[float | None, bool]:
     return None, len(runs) > 1
 
 
-def runs_of(stamps: NDArray, unit: str) -> list[clock.Run]:
-    """Return the runs of a clock with these stamps (n,)."""
+def runs_of(stamps: NDArray, count_s: float) -> list[clock.Run]:
+    """Return the runs of a clock with these stamps (n,), whose counts last so long, s."""
     stamps = clock.whole(stamps) if stamps.dtype.kind in "iu" else stamps
-    time_s = (stamps - clock.first_stamp(stamps)).astype(float) * UNITS[unit].factor
-    return clock.runs(time_s, stamps)
+    time_s = (stamps - clock.first_stamp(stamps)).astype(float) * count_s
+    return clock.runs(time_s, stamps, count_s)

@@ -84,7 +84,8 @@ def _written(text: str) -> str | None:
 
 def _forms() -> dict[str, str]:
     """Return the spellings of each unit, such as ``rad_s`` and ``deg_per_s``."""
-    forms = {name: name for name in UNITS if name != "iso8601"} | ALIASES
+    # An h or a d in a name is a symbol, and a date has no unit.
+    forms = {name: name for name in UNITS if name not in ("iso8601", "h", "d")} | ALIASES
     for name, unit in list(forms.items()):
         forms |= {name.replace("/", per): unit for per in ("_", "_per_", " per ") if "/" in name}
         forms |= {

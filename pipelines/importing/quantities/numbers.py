@@ -1,5 +1,7 @@
 """A file's values as numbers; text that is no number is reported, and counts as missing."""
 
+import re
+
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
@@ -60,32 +62,37 @@ def same_stamps(one: NDArray, other: NDArray) -> bool:
     )
 
 
-def whole_nanoseconds(values: NDArray) -> NDArray:
+def whole_nanoseconds(values: NDArray, written: str | None = None) -> NDArray:
     """Return dates such as ``2026-01-31 12:00:00.125`` as nanoseconds since 1970.
 
-    In ``31.01.2026 12:00:00,125`` the day comes first, as points separate the parts. Times of day
+    In ``31.01.2026 12:00:00,125`` the day comes first, as points separate the parts. With slashes,
+    the dates show whether it does: no month is above 12, and midnight adds a day. Times of day
     without a date are those of 1 January 1970.
 
     Parameters
     ----------
     values : (n,) array
         Dates, durations, times of day, or numbers, which are returned as they are.
+    written : str, optional
+        How dates are written, as in ``datetime.strptime``.
 
     Returns
     -------
     (n,) array of int64
         Nanoseconds; float64 with NaN where some are no dates.
     """
-    if values.dtype.kind in "iuf":
+    if values.dtype.kind in "iuf" and written is None:
         return values
     if values.dtype.kind in "mM":
         whole = values.astype(f"{values.dtype.kind}8[ns]").astype(np.int64)
         missing = np.isnat(values)
         return np.where(missing, np.nan, whole) if missing.any() else whole
-    text = pd.Series(values).astype("string")
+    text = pd.Series(values).astype("string").str.strip()
+    if written is not None:
+        return _nanoseconds(pd.to_datetime(text, errors="coerce", format=written, utc=True))
     # ISO 8601 has the year first. It allows a comma before the fraction, which becomes a point.
-    text = text.str.replace(r"^\s*(\d\d)\.(\d\d)\.(\d{4})", r"\3-\2-\1", regex=True)
-    text = text.str.replace(",", ".", regex=False)
+    text = text.str.replace(r"^(\d\d)\.(\d\d)\.(\d{4})", r"\3-\2-\1", regex=True)
+    text = text.str.replace(r"\s*(?:UTC|GMT)$", "Z", regex=True).str.replace(",", ".", regex=False)
     # In UTC, so that stamps with different offsets can be compared, as across a change to summer
     # time.
     dates = pd.to_datetime(text, errors="coerce", format="ISO8601", utc=True)
@@ -94,12 +101,67 @@ def whole_nanoseconds(values: NDArray) -> NDArray:
         dates = pd.to_datetime(
             "1970-01-01T" + text.astype("str"), errors="coerce", format="ISO8601", utc=True
         )
+    return _nanoseconds(_in_other_words(text) if dates.isna().all() else dates)
+
+
+def _nanoseconds(dates: pd.Series) -> NDArray:
+    """Return dates (n,) as nanoseconds since 1970."""
     stamps = dates.astype("datetime64[ns, UTC]").astype("int64")
     # Integers where none is missing: at 1.7e18 ns since 1970, neighbours in float64 are 256 ns
     # apart.
     if dates.notna().all():
         return stamps.to_numpy()
     return stamps.where(dates.notna()).to_numpy(dtype=float)
+
+
+_OTHER_WORDS = re.compile(
+    r"^(?:(?P<one>\d{1,4})(?P<mark>[/.-])(?P<two>\d{1,2})[/.-](?P<three>\d{1,4})[T\s]+)?"
+    r"(?P<hour>\d{1,2}):(?P<minute>\d\d)(?::(?P<second>\d\d)(?:[.:](?P<fraction>\d{1,9}))?)?"
+    r"\s*(?P<half>[AaPp]\.?[Mm]\.?)?\s*(?P<zone>Z|[+-]\d\d:?\d\d)?$"
+)
+"""Dates with slashes, and times of day with AM or PM, or a colon before their milliseconds."""
+
+
+def _in_other_words(text: pd.Series) -> pd.Series:
+    """Return dates (n,) that are not of ISO 8601; missing where day and month may be exchanged."""
+    parts = text.str.extract(_OTHER_WORDS).astype("string")
+    afternoon = parts["half"].str.lower().str.startswith("p").fillna(False)
+    hour = pd.to_numeric(parts["hour"])
+    hour = hour.where(parts["half"].isna(), hour % 12 + 12 * afternoon.astype(int))
+    clock = hour.astype("string").str.zfill(2) + ":" + parts["minute"]
+    clock += ":" + parts["second"].fillna("00") + "." + parts["fraction"].fillna("0")
+    clock += parts["zone"].fillna("Z")
+
+    def dates(*order: str) -> pd.Series:
+        year, month, day = (parts[name].str.zfill(2) for name in order)
+        days = year.where(year.str.len() == 4, "20" + year) + "-" + month + "-" + day
+        stamps = days.fillna("1970-01-01") + "T" + clock
+        return pd.to_datetime(stamps, errors="coerce", format="ISO8601", utc=True)
+
+    if (parts["one"].str.len() == 4).any():
+        return dates("one", "two", "three")
+    day_first = dates("three", "two", "one")
+    if (parts["mark"] == ".").any():
+        return day_first
+    return _likelier(day_first, dates("three", "one", "two"))
+
+
+def _likelier(one: pd.Series, other: pd.Series) -> pd.Series:
+    """Return the readings (n,) of dates that are dates, and follow each other; else missing ones.
+
+    A month above 12 is no date. Across midnight, the wrong reading goes on by a month.
+    """
+    day = pd.Timedelta(days=1)
+    missing = [int(dates.isna().sum()) for dates in (one, other)]
+    if missing[0] != missing[1]:
+        return one if missing[0] < missing[1] else other
+    steps = [dates.diff().dropna() for dates in (one, other)]
+    if steps[0].equals(steps[1]):
+        return one
+    follow = [bool((step.abs() < day).all()) for step in steps]
+    if follow[0] != follow[1]:
+        return one if follow[0] else other
+    return one.mask(one.notna())
 
 
 def are_whole(values: NDArray) -> bool:

@@ -13,11 +13,14 @@ from pipelines.importing.finding import Finding, Note, counted, noting, unnoted
 from pipelines.importing.quantities.numbers import numbers, whole_nanoseconds
 from pipelines.settings.import_map import TimeSettings
 from pipelines.settings.units import UNITS, unit_named
+from pipelines.signals.sampling import local_period, missing_samples, sample_rate, uneven_share
 
 REGISTERS = (2.0**16, 2.0**31, 2.0**32)
 """Moduli of counters."""
 LONGEST = 29
 """Greatest length of a stamp in a message: a date to the nanosecond."""
+DAY_NS = 86_400_000_000_000
+"""A day, ns."""
 NEAR = 0.01
 """Distance from its modulus, as a share, within which a counter is full."""
 SLOWEST_HZ, FASTEST_HZ = 10.0, 1e4
@@ -89,8 +92,10 @@ def _content(raw: NDArray) -> str:
     return "dates" if np.isfinite(whole_nanoseconds(some)).any() else ""
 
 
-def stamps(raw: NDArray, column: str, settings: TimeSettings, note: Note) -> NDArray:
-    """Return time stamps as numbers in the map's unit.
+def stamps(
+    raw: NDArray, column: str, settings: TimeSettings, note: Note, plus: NDArray | None = None
+) -> NDArray:
+    """Return time stamps as numbers of counts (``TimeSettings.count_s``).
 
     Whole numbers stay integers, as float64 cannot represent every nanosecond since 1970.
 
@@ -104,6 +109,8 @@ def stamps(raw: NDArray, column: str, settings: TimeSettings, note: Note) -> NDA
         Unit of the stamps.
     note : callable
         Takes what is reported about the stamps.
+    plus : (n,) array, optional
+        The column that is added.
 
     Returns
     -------
@@ -117,15 +124,64 @@ def stamps(raw: NDArray, column: str, settings: TimeSettings, note: Note) -> NDA
     InputError
         If there is no date, or a stamp does not fit into int64.
     """
+    if plus is not None and len(plus) != len(raw):
+        raise InputError(f"time.plus has {len(plus)} rows, expected {len(raw)} as {column!r}")
+    if settings.is_written:
+        return _written(raw, column, settings, note, plus)
     _check_unit(raw, column, settings.unit)
-    dates = settings.unit == "iso8601"
-    values = whole_nanoseconds(raw) if dates or raw.dtype.kind in "mM" else raw
-    if dates and len(raw) and not np.isfinite(values).any():
-        raise InputError(
-            f"has {str(raw[0])[:LONGEST]!r}, expected a date such as 2026-01-31 12:00:00.125;"
-            " correct time.column or time.unit in the map"
-        )
+    values = _counts(raw, note)
+    if plus is None:
+        return values
+    unit = unit_named(settings.unit)
+    assert unit is not None, "the map checks its units"
+    ratio = unit.factor * settings.scale / settings.count_s
+    # As integers where possible: seconds since 1970 and their nanoseconds need all digits.
+    return values * (round(ratio) if values.dtype.kind == "i" else ratio) + _counts(plus, note)
+
+
+def _counts(raw: NDArray, note: Note) -> NDArray:
+    values = whole_nanoseconds(raw) if raw.dtype.kind in "mM" else raw
     return whole(values) if values.dtype.kind in "iu" else numbers(values, note)
+
+
+def _written(
+    raw: NDArray, column: str, settings: TimeSettings, note: Note, plus: NDArray | None
+) -> NDArray:
+    """Return dates and times of day as nanoseconds."""
+    if plus is not None:
+        # A file's typed date ends with a time of its own.
+        days = raw.astype("datetime64[D]") if raw.dtype.kind == "M" else raw
+        raw = np.array([f"{day} {time}" for day, time in zip(days, plus, strict=True)], object)
+    if settings.format is None:
+        _check_unit(raw, column, settings.unit)
+    values = whole_nanoseconds(raw, settings.format)
+    if len(raw) and not np.isfinite(values).any():
+        example = " such as 2026-01-31 12:00:00.125" if settings.format is None else ""
+        day = (
+            "; where day and month may be exchanged, set time.format" if "/" in str(raw[0]) else ""
+        )
+        raise InputError(
+            f"has {str(raw[0])[:LONGEST]!r}, expected a date{example or ' as in time.format'};"
+            f" correct time.column or time.unit in the map{day}"
+        )
+    stamps = whole(values) if values.dtype.kind in "iu" else values
+    return _past_midnight(stamps, note)
+
+
+def _past_midnight(stamps: NDArray, note: Note) -> NDArray:
+    """Count times of day (n,) without a date on after midnight, ns."""
+    known = stamps[np.isfinite(stamps)]
+    if not len(known) or known.min() < 0 or known.max() >= DAY_NS:
+        return stamps
+    far = 20 * period(known)
+    # A clock that starts over goes back by less than a day, but for a moment.
+    steps = np.diff(known, prepend=known[0])
+    nights = (steps < 0) & (steps + DAY_NS <= max(far, 1e9))
+    if nights.any():
+        note(f"passes midnight, {counted(int(nights.sum()), 'time')}", "counted on")
+        stamps = stamps.copy()
+        stamps[np.isfinite(stamps)] = known + (DAY_NS * np.cumsum(nights)).astype(stamps.dtype)
+    return stamps
 
 
 def whole(values: NDArray) -> NDArray:
@@ -160,11 +216,11 @@ def seconds(values: NDArray, origin: float, settings: TimeSettings, note: Note) 
     Parameters
     ----------
     values : (n,) array
-        Stamps in the map's unit.
+        Stamps in counts.
     origin : float
         Stamp at time 0.
     settings : TimeSettings
-        Unit of the stamps, and the modulus of the clock if it wraps around.
+        Duration of a count, and the modulus of the clock if it wraps around.
     note : callable
         Takes what is reported about wraparounds.
 
@@ -173,13 +229,11 @@ def seconds(values: NDArray, origin: float, settings: TimeSettings, note: Note) 
     (n,) array
         Times, s, NaN where a stamp is missing.
     """
-    unit = unit_named(settings.unit)
-    assert unit is not None, "the map checks its units"
     # Subtracted as integers first, because float64 cannot hold every nanosecond since 1970.
     since = (values - origin).astype(float)
     if settings.wraps_at is not None:
         since = _unwrapped(since, settings.wraps_at, note)
-    return since * unit.factor
+    return since * settings.count_s
 
 
 def first_stamp(values: NDArray) -> float:
@@ -206,7 +260,7 @@ def _unwrapped(since: NDArray, modulus: float, note: Note) -> NDArray:
     return since
 
 
-def runs(time_s: NDArray, raw: NDArray, note: Note = unnoted) -> list[Run]:
+def runs(time_s: NDArray, raw: NDArray, count_s: float, note: Note = unnoted) -> list[Run]:
     """Divide a log into runs whose times strictly increase; refuse a clock that runs backwards.
 
     Parameters
@@ -215,6 +269,8 @@ def runs(time_s: NDArray, raw: NDArray, note: Note = unnoted) -> list[Run]:
         Times, s, which may be missing, repeat, go back and start over.
     raw : (n,) array
         Stamps as the file has them, which show whether a counter was full.
+    count_s : float
+        Duration of a count of these stamps, s.
     note : callable
         Takes what is reported about the clock.
 
@@ -238,7 +294,8 @@ def runs(time_s: NDArray, raw: NDArray, note: Note = unnoted) -> list[Run]:
     for k in begins[1:]:
         back = time_s[rows[k - 1]] - time_s[rows[k]]
         seen = f"clock starts over at row {rows[k]}, {back:.6g} s back"
-        note(seen, _if_full(float(raw[rows[k - 1]]), float(raw[rows[k]])))
+        step = period(time_s[rows]) / count_s
+        note(seen, _if_full(float(raw[rows[k - 1]]), float(raw[rows[k]]), step, count_s))
     parts = [_ordered(part, time_s) for part in np.split(rows, begins[1:])]
     return [run for run in parts if len(run) > 1]
 
@@ -311,31 +368,38 @@ def _stays_behind(time: NDArray) -> int | None:
     return int(starts[long[0]]) if len(long) else None
 
 
-def full_register(before: float, after: float) -> float | None:
-    """Return the modulus of a counter that goes back from one stamp to the next.
+def full_clock(before: float, after: float, step: float, count_s: float) -> float | None:
+    """Return the modulus of a clock that goes back from one stamp to the next.
 
     Parameters
     ----------
     before, after : float
         Both stamps, in counts.
+    step : float
+        Usual step, in counts.
+    count_s : float
+        Duration of a count, s.
 
     Returns
     -------
     float or None
-        Counts; None where no register's width fits.
+        Counts; None where neither a register's width fits nor a day.
     """
     near = [limit for limit in REGISTERS if (1.0 - NEAR) * limit < before < limit]
-    if not near:
-        return None
     # A counter with a sign continues at its lowest number, below zero.
-    return 2.0 * near[0] if after < 0.0 else near[0]
+    moduli = [2.0 * near[0] if after < 0.0 else near[0]] if near else []
+    # A clock of the day begins again at midnight, without a pause.
+    day = float(f"{1e-9 * DAY_NS / count_s:.12g}")
+    if 0.0 < after + day - before <= 20.0 * step:
+        moduli.append(day)
+    return moduli[0] if moduli else None
 
 
-def _if_full(before: float, after: float) -> str:
-    full = full_register(before, after)
+def _if_full(before: float, after: float, step: float, count_s: float) -> str:
+    full = full_clock(before, after, step, count_s)
     if full is None:
         return "another run begins"
-    return f"after {before:.10g}: if it was full, set time.wraps_at = {full:.0f}"
+    return f"after {before:.10g}: if it was full, set time.wraps_at = {full:.12g}"
 
 
 def _ordered(rows: NDArray, time_s: NDArray) -> Run:
@@ -384,47 +448,28 @@ class Sampling:
     """Shortest, median and longest step, without gaps."""
     irregular: float
     """Share of the steps that are more than 2 % off the median."""
+    rates_hz: tuple[float, float]
+    """Lowest and highest rate that lasts for a tenth of the run or more."""
 
     @classmethod
-    def of(cls, clock_s: NDArray, kept_s: NDArray) -> "Sampling":
+    def of(cls, time_s: NDArray) -> "Sampling":
         """Measure rate, gaps and regularity.
 
         Parameters
         ----------
-        clock_s : (n,) array
-            Times of all rows, s.
-        kept_s : (m,) array
-            Times of the rows that become a recording, s.
+        time_s : (n,) array
+            Times of the samples, s.
         """
-        # In a log of several rates only a few rows have all values, and these have their own rate.
-        steps = np.diff(clock_s if 2 * len(kept_s) > len(clock_s) else kept_s)
-        median = float(np.median(steps))
-        longest = longest_step(steps)
-        regular = steps[steps <= longest]
-        # The mean, as stamps of few digits round the median.
-        period = float(np.mean(regular))
-        kept = np.diff(kept_s)
-        gaps = [
-            (float(kept_s[k] + period), max(1, round(float(kept[k]) / period) - 1))
-            for k in np.flatnonzero(kept > longest)
-        ]
-        irregular = float(np.mean(np.abs(regular - median) > 0.02 * median))
-        limits = (float(regular.min()), median, float(regular.max()))
-        return cls(_rounded(1.0 / period, len(clock_s)), gaps, limits, irregular)
+        steps, missing = np.diff(time_s), missing_samples(time_s)
+        regular = steps[missing == 0]
+        period = local_period(time_s)
+        gaps = [(float(time_s[k] + period[k]), int(missing[k])) for k in np.flatnonzero(missing)]
+        limits = (float(regular.min()), float(np.median(regular)), float(regular.max()))
+        slow, fast = np.quantile(period, (0.9, 0.1))
+        rates_hz = (float(1.0 / slow), float(1.0 / fast))
+        return cls(sample_rate(time_s), gaps, limits, uneven_share(regular), rates_hz)
 
     @property
     def missing(self) -> int:
         """Samples missing in all gaps."""
         return sum(count for _, count in self.gaps)
-
-
-def longest_step(steps: NDArray) -> float:
-    """Return the longest step, s, that is no gap: 1.5 times that of 95 % of all steps (n,)."""
-    # The quantile allows for clocks whose steps vary.
-    return 1.5 * float(np.quantile(steps, 0.95))
-
-
-def _rounded(rate_hz: float, samples: int) -> float:
-    """Round to a whole number of Hz if the last sample moves by less than 1 % of a period."""
-    whole = float(round(rate_hz))
-    return whole if whole and abs(whole - rate_hz) * samples < 0.01 * rate_hz else rate_hz

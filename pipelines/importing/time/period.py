@@ -10,6 +10,7 @@ from scipy.optimize import minimize_scalar
 from scipy.signal import argrelmin, correlate
 
 from pipelines.importing.quantities.consistency import whole_rows
+from pipelines.signals.sampling import whole_periods
 
 SIMILAR = 0.5
 """Half mean squared difference, in variances, below which a motion may repeat."""
@@ -81,10 +82,12 @@ def repeats_after(time_s: NDArray, motion: NDArray) -> float | None:
 def _mean_differences(columns: NDArray) -> NDArray:
     """Return half the mean squared difference at each lag up to half the run, of the worst joint.
 
-    The motion of k joints, (n, k), has variance 1; so has the unit of the result, (n // 2 + 1,).
+    The motion of k joints, (n, k), has variance 1; so has the unit of the result, a value for each
+    lag.
     """
     n = len(columns)
-    lags = np.arange(n // 2 + 1)
+    # The second of two periods may lack a sample.
+    lags = np.arange((n + 1) // 2 + 1)
     worst = np.zeros(len(lags))
     for column in columns.T:
         # The square of a difference is two energies less twice the correlation. By FFT and
@@ -120,8 +123,7 @@ def _median_difference(columns: NDArray, lag: float) -> float:
     # Share of the variance below which a period has too little motion to be compared.
     at_rest = 0.01
     n, length = len(columns), int(lag)
-    # The small number keeps a whole number of periods whole, in spite of rounding.
-    count = int(n / lag + 1e-6)
+    count = whole_periods(n - 1, 1.0, lag)
     begins = 0.5 * (n - count * lag) + lag * np.arange(count)
     at = begins[:, np.newaxis] + np.arange(length)
     periods = np.stack([np.interp(at, np.arange(n), column) for column in columns.T], axis=-1)

@@ -1,5 +1,9 @@
 """A block: neighbouring registers that one exchange reads or writes."""
 
+from typing import Literal
+
+from pydantic import Field
+
 from pipelines.settings.base import Settings
 from pipelines.settings.rig.register import DIMENSION, Register
 
@@ -9,9 +13,27 @@ MOST_REGISTERS = {"read": 125, "write": 121, "record": 125}
 """Registers that one exchange carries."""
 
 
+class ReadSettings(Settings):
+    """How a device is read: the function code, and the registers of one request."""
+
+    function: Literal[3, 4] = Field(3, description="3 reads holding, 4 input registers.")
+    most_words: int = Field(
+        MOST_REGISTERS["read"],
+        ge=1,
+        le=MOST_REGISTERS["read"],
+        description="Most registers that the device answers in one request.",
+    )
+
+
+class ReadBlock(ReadSettings):
+    """A block that is read, in several requests where one cannot carry it."""
+
+    across_gaps: bool = Field(True, description="Whether registers between the named are read.")
+
+
 def registers_of(block: Settings) -> dict[str, Register]:
     """Return the registers that a block has, by quantity."""
-    return {name: register for name, register in block if register is not None}
+    return {name: value for name, value in block if isinstance(value, Register)}
 
 
 def check_block(block: Settings, name: str) -> None:
@@ -36,10 +58,24 @@ def check_block(block: Settings, name: str) -> None:
             " forward; turn its sign"
         )
     _check_addresses(registers, name)
+    if isinstance(block, ReadSettings):
+        _check_words(registers, block.most_words, name)
+    else:
+        _check_length(registers, name)
+
+
+def _check_words(registers: dict[str, Register], most_words: int, name: str) -> None:
+    """Refuse values that do not fit into a request, as halves may be of two samples."""
+    for quantity, register in registers.items():
+        if register.registers > most_words:
+            raise ValueError(
+                f"{name}.most_words: found {most_words}, but {quantity} takes"
+                f" {register.registers} registers, which one request must bring"
+            )
 
 
 def _check_addresses(registers: dict[str, Register], name: str) -> None:
-    """Refuse registers that overlap, or too many for one exchange."""
+    """Refuse registers that overlap."""
     taken: dict[int, str] = {}
     for quantity, register in registers.items():
         for address in register.addresses:
@@ -48,7 +84,12 @@ def _check_addresses(registers: dict[str, Register], name: str) -> None:
                     f"{name}.{quantity}: register {address} is part of {taken[address]} too"
                 )
             taken[address] = quantity
-    # Registers in between are read too, whatever they are.
+
+
+def _check_length(registers: dict[str, Register], name: str) -> None:
+    """Refuse too many registers for one exchange."""
+    taken = [address for register in registers.values() for address in register.addresses]
+    # Registers in between count too.
     length = max(taken) - min(taken) + 1
     if length > MOST_REGISTERS[name]:
         raise ValueError(

@@ -16,7 +16,7 @@ class DeviceSettings(Settings):
     line: str | None = Field(None, description="Its table below [line]; else its own TCP line.")
     host: str = Field("127.0.0.1", description="Name or address; an embedded rig has its own.")
     port: int = Field(502, ge=1, le=65535, description="TCP port; an embedded rig chooses its own.")
-    unit: int = Field(1, ge=1, le=247, description="Modbus unit id.")
+    unit: int = Field(1, ge=0, le=255, description="Modbus unit id; 1 to 247 in RTU frames.")
     map: str = Field(description="Its register map, a table below [map].")
 
     @model_validator(mode="after")

@@ -1,6 +1,6 @@
 """A line: the connection that devices share, by TCP, RTU on a serial port, RTU over TCP or TLS."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Annotated, ClassVar, Literal, Self
 
@@ -166,3 +166,24 @@ class RtuLine(Line):
 LineSettings = Annotated[
     TcpLine | RtuLine | RtuOverTcpLine | TlsLine, Field(discriminator="transport")
 ]
+
+
+def with_files_near(lines: Mapping[str, LineSettings], rig_file: Path) -> dict[str, LineSettings]:
+    """Return lines with the paths of their files relative to the folder of a rig file."""
+    return {name: line.with_files_in(rig_file.parent) for name, line in lines.items()}
+
+
+def check_unit(unit: int, line: LineSettings, name: str | None) -> None:
+    """Refuse a unit that a line cannot address.
+
+    Raises
+    ------
+    ValueError
+        Names the unit and the line.
+    """
+    # "Modbus over serial line" V1.02, 2.2: 0 is for all devices at once, 248 to 255 are reserved.
+    if not line.has_transaction_ids and not 1 <= unit <= 247:
+        raise ValueError(
+            f"unit: found {unit} on line {name}, expected 1 to 247 in RTU frames; 0 and 248 to 255"
+            " are for Modbus TCP alone"
+        )

@@ -27,7 +27,23 @@ REGISTERS = {kind: struct.calcsize(f">{code}") // 2 for kind, code in STRUCT_COD
 """Registers of 16 bits that a value takes."""
 
 Unit = Literal[
-    "1", "rad", "mrad", "deg", "rad/s", "deg/s", "rpm", "A", "mA", "N", "kN", "°C", "s", "ms", "us"
+    "1",
+    "rad",
+    "mrad",
+    "deg",
+    "rad/s",
+    "deg/s",
+    "rpm",
+    "A",
+    "mA",
+    "N·m",
+    "mN·m",
+    "N",
+    "kN",
+    "°C",
+    "s",
+    "ms",
+    "us",
 ]
 
 UNITS = {"1": 1.0} | {unit: units.UNITS[unit].factor for unit in get_args(Unit) if unit != "1"}
@@ -43,6 +59,7 @@ DIMENSION = {
     "reference": ("rad", "mrad", "deg"),
     "velocity": ("rad/s", "deg/s", "rpm"),
     "current": ("A", "mA"),
+    "torque": ("N·m", "mN·m"),
     "temperature": ("°C",),
     "force_x": ("N", "kN"),
     "force_y": ("N", "kN"),

@@ -1,12 +1,13 @@
 """``[map]`` of a rig file: which registers the drives and force sensors of a make have."""
 
-from typing import Annotated, Self
+from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
 from pipelines.settings.base import Settings, repeated
-from pipelines.settings.rig.block import check_block, check_counter, registers_of
+from pipelines.settings.rig.block import ReadBlock, check_block, check_counter, registers_of
 from pipelines.settings.rig.register import Register
+from pipelines.settings.rig.requests import requests_of
 from pipelines.settings.rig.ring import RingSettings
 
 
@@ -15,10 +16,11 @@ class Identity(Settings):
 
     address: int = Field(ge=0, le=65535, description="Address of the register.")
     value: int = Field(ge=0, le=65535, description="Its value on the right device.")
+    function: Literal[3, 4] | None = Field(None, description="3 or 4; else that of read.")
 
 
-class DriveRead(Settings):
-    """Values of a drive, all latched at one instant; read in one block."""
+class DriveRead(ReadBlock):
+    """Values of a drive, all latched at one instant."""
 
     sequence: Register = Field(description="Sample counter.")
     time: Register = Field(description="The device's clock at the sample.")
@@ -31,15 +33,18 @@ class DriveRead(Settings):
 
 
 class DriveWrite(Settings):
-    """Values sent to a drive, in one block."""
+    """Values sent to a drive."""
 
+    function: Literal[6, 16, 23] = Field(
+        23, description="23 writes and reads in one exchange; 16 and 6 write only."
+    )
     reference: Register = Field(description="Set-point angle, to be reached within one sample.")
     control: Register = Field(description="Control word.")
     heartbeat: Register | None = Field(None, description="Counts up with every write.")
 
 
-class SensorRead(Settings):
-    """Values of a 3-axis force sensor, read in one block; axes as in docs/contracts.md."""
+class SensorRead(ReadBlock):
+    """Values of a 3-axis force sensor; axes as in docs/contracts.md."""
 
     sequence: Register = Field(description="Sample counter.")
     force_x: Register = Field(description="Force along the segment (distal).")
@@ -52,7 +57,7 @@ class DriveMap(Settings):
 
     identity: tuple[Identity, ...] = Field((), description="Registers that identify the make.")
     read: DriveRead = Field(description="Block that is read.")
-    write: DriveWrite = Field(description="Block that is written as a whole, without gaps.")
+    write: DriveWrite = Field(description="Block that is written.")
     own_scale: bool = Field(
         False, description="Set-points agree with angles though their registers differ."
     )
@@ -72,7 +77,7 @@ class DriveMap(Settings):
     def _is_consistent(self) -> Self:
         check_block(self.read, "read")
         check_block(self.write, "write")
-        self._check_no_gap()
+        self._check_functions()
         self._check_faults()
         self._check_enabled_bits()
         self._check_ring_counters()
@@ -89,18 +94,42 @@ class DriveMap(Settings):
     def _masks(self) -> dict[str, int]:
         return {"fault_mask": self.fault_mask, "enabled_mask": self.enabled_mask}
 
-    def _check_no_gap(self) -> None:
-        """Refuse unnamed registers in the block that is written as a whole."""
+    def _check_functions(self) -> None:
+        """Refuse blocks that cannot be read and written by their functions."""
+        spans = [register.addresses for register in registers_of(self.write).values()]
+        if self.write.function == 6:
+            long = [name for name, one in registers_of(self.write).items() if one.registers > 1]
+            if long:
+                raise ValueError(
+                    f"write.function: found 6, which writes one register, but {long[0]} takes more;"
+                    " the drive would follow half a value; set function = 16"
+                )
+        if self.write.function != 23:
+            return
+        if self.read.function != 3:
+            raise ValueError(
+                "write.function: found 23, which reads holding registers, with read.function = 4;"
+                " set write.function = 16"
+            )
+        if len(self.read_requests) > 1:
+            raise ValueError(
+                f"write.function: found 23, which reads one request, but read takes"
+                f" {len(self.read_requests)}; set write.function = 16"
+            )
         # Reading a gap is harmless. Writing 0 to an unknown register may change the drive's
         # settings.
-        registers = registers_of(self.write).values()
-        named = {address for register in registers for address in register.addresses}
-        unnamed = sorted(set(range(min(named), max(named))) - named)
-        if unnamed:
+        runs = requests_of(spans, 65536, across_gaps=False)
+        if len(runs) > 1:
             raise ValueError(
-                f"write: register {unnamed[0]} between {min(named)} and {max(named)} has no name,"
-                " expected a block without gaps, as it is written as a whole"
+                f"write: register {runs[0].stop} between {runs[0].start} and"
+                f" {runs[-1].stop - 1} has no name, expected a block without gaps; set"
+                " write.function = 16, which writes its parts one after another"
             )
+
+    @property
+    def read_requests(self) -> list[range]:
+        """The requests that read its block."""
+        return read_requests(self.read)
 
     def _check_faults(self) -> None:
         for name, mask in self._masks.items():
@@ -185,6 +214,12 @@ class DriveMap(Settings):
         bits = [bit for bit in range(active.bit_length()) if active >> bit & 1]
         names = ", ".join(self.faults.get(bit, f"bit {bit}") for bit in bits)
         return f"0x{active:04X}: {names}"
+
+
+def read_requests(read: ReadBlock) -> list[range]:
+    """Return the requests that read a block."""
+    spans = [register.addresses for register in registers_of(read).values()]
+    return requests_of(spans, read.most_words, across_gaps=read.across_gaps)
 
 
 class SensorMap(Settings):

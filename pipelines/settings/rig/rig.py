@@ -22,8 +22,9 @@ from pipelines.settings.rig.devices import (
     SensorSettings,
 )
 from pipelines.settings.rig.geometry import GeometrySettings
-from pipelines.settings.rig.line import LineSettings, TcpLine
+from pipelines.settings.rig.line import LineSettings, TcpLine, check_unit, with_files_near
 from pipelines.settings.rig.plant import PlantSettings
+from pipelines.settings.rig.recording_only import refuse_recording_only
 from pipelines.settings.rig.register import DIMENSION
 from pipelines.settings.rig.register_map import Maps
 from pipelines.settings.rig.safety import SafetySettings
@@ -113,6 +114,8 @@ class RigSettings(Settings):
             raise ValueError(
                 f"line: two lines lead to {place}; make them one, with all its devices on it"
             )
+        for device in devices:
+            check_unit(device.unit, self.line_of(device), device.line)
         for place, unit in repeated((self.line_of(one).place, one.unit) for one in devices):
             raise ValueError(f"unit: two devices have {place} unit {unit}; correct one")
 
@@ -127,6 +130,14 @@ class RigSettings(Settings):
         if self.plant is None and (self.embedded or self.clock == "lockstep"):
             raise ValueError(
                 "plant: missing; a virtual rig (embedded, or in lockstep) needs a [plant]"
+            )
+        own_writes = [
+            drive.map for drive in self.drive if self.map.drive[drive.map].write.function != 23
+        ]
+        if self.clock == "lockstep" and own_writes:
+            raise ValueError(
+                'clock: found "lockstep", in which an FC23 exchange ends a sample, but'
+                f' map.drive.{own_writes[0]}.write.function is not 23; set clock = "real_time"'
             )
         drifts = self.plant is not None and any((*self.plant.clock_ppm, *self.plant.clock_offset_s))
         if self.clock == "lockstep" and (self.clocks == "own" or drifts):
@@ -307,10 +318,10 @@ def load_rig(path: Path | str) -> RigSettings:
     SettingsError
         Names the key that is missing or wrong.
     """
+    refuse_recording_only(path)
     rig = load_toml(path, RigSettings)
     # Only here, as the settings themselves do not know in which folder their file is.
-    lines = {name: line.with_files_in(Path(path).parent) for name, line in rig.line.items()}
-    return rig.model_copy(update={"line": lines})
+    return rig.model_copy(update={"line": with_files_near(rig.line, Path(path))})
 
 
 def _check_block_reach(

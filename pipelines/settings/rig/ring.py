@@ -5,7 +5,13 @@ from typing import Self
 from pydantic import Field, model_validator
 
 from pipelines.settings.base import Settings
-from pipelines.settings.rig.block import MOST_REGISTERS, check_block, check_counter, registers_of
+from pipelines.settings.rig.block import (
+    MOST_REGISTERS,
+    ReadSettings,
+    check_block,
+    check_counter,
+    registers_of,
+)
 from pipelines.settings.rig.register import Register
 
 # "MODBUS application protocol specification" V1.1b3, section 6.18.
@@ -24,8 +30,8 @@ class RingRecord(Settings):
     reference: Register | None = Field(None, description="Set-point in force.")
 
 
-class RingSettings(Settings):
-    """A ring of registers read by FC03, or a queue read by FC24."""
+class RingSettings(ReadSettings):
+    """A ring of registers, or a queue read by FC24."""
 
     newest: Register | None = Field(None, description="Of a ring: number of the newest record.")
     address: int | None = Field(None, ge=0, le=65535, description="Of a ring: place of record 0.")
@@ -43,6 +49,11 @@ class RingSettings(Settings):
             raise ValueError(
                 f"words: found {self.words}, but the record's registers take {length}; correct one"
             )
+        if self.words > self.most_words:
+            raise ValueError(
+                f"words: found {self.words}, more than most_words ({self.most_words}); a request"
+                " must bring a whole record"
+            )
         # An answer removes its records from the queue, so a record must fit into one answer.
         if self.fifo is not None and self.words > MOST_QUEUED:
             raise ValueError(
@@ -56,7 +67,7 @@ class RingSettings(Settings):
     @property
     def records_per_read(self) -> int:
         """Greatest number of records that one read returns."""
-        return (MOST_REGISTERS["read"] if self.fifo is None else MOST_QUEUED) // self.words
+        return (self.most_words if self.fifo is None else MOST_QUEUED) // self.words
 
     def _check_kind(self) -> None:
         """Refuse all but the keys of a ring, or of a queue."""

@@ -12,7 +12,8 @@ def checked(rig_file, serve, monkeypatch):
     """Check a rig that swings out, against a rig file; returns the report.
 
     ``believed`` are changes of the file, not of the rig that is there; ``served`` are changes of
-    both; ``options`` are those of the check; ``on_a_line`` puts all devices on one.
+    both; ``options`` are those of the check; ``on_a_line`` puts all devices on one, with
+    the changes ``changed_line``.
     """
 
     def run(
@@ -22,11 +23,13 @@ def checked(rig_file, serve, monkeypatch):
         fault=None,
         options=None,
         on_a_line=False,
+        changed_line=None,
+        real_hz=40.0,
         **changes,
     ):
         replace = dict(served or {})
         if shipped == "real_time":  # slow, for a busy computer
-            replace["[plant]\n"] = "[plant]\nsample_rate_hz = 40.0\n"
+            replace["[plant]\n"] = f"[plant]\nsample_rate_hz = {real_hz}\n"
         monkeypatch.setattr(survey, "TOGETHER_S", 1.5 if shipped == "real_time" else 0.3)
         monkeypatch.setattr(survey, "DRIVES_S", 0.1)
         with socket.socket() as probe:
@@ -37,6 +40,8 @@ def checked(rig_file, serve, monkeypatch):
         seen = rig_file(shipped, port, replace | (believed or {}), **changes)
         if on_a_line:
             line = f'\n[line.leg]\ntransport = "tcp"\nhost = "127.0.0.1"\nport = {port}\n'
+            for was, believed_line in (changed_line or {}).items():
+                line = line.replace(was, believed_line)
             seen.write_text(seen.read_text().replace(f"port = {port}\n", 'line = "leg"\n') + line)
         options = options or {}
         with serve(rig, port, options.get("run", "exo_alone"), fault=fault):

@@ -13,6 +13,8 @@ from pipelines.errors import DeviceError, SettingsError
 from pipelines.rig.device import Device, Sensor
 from pipelines.settings.rig import load_rig
 
+pytestmark = pytest.mark.long
+
 ANGLE = 'angle = { address = 104, type = "int32", scale = 1e-6, unit = "rad" }'
 TIME = 'time = { address = 102, type = "uint32", unit = "us" }'
 VELOCITY = 'velocity = { address = 106, type = "int32", scale = 1e-5, unit = "rad/s" }'
@@ -309,7 +311,7 @@ def test_lines_that_do_not_come_about_are_waited_for_at_once_and_not_one_after_t
 
 
 def test_a_line_that_is_lost_while_its_devices_are_read_is_reported_once(checked, monkeypatch):
-    async def lost(probe, report):
+    async def lost(probe, report, earlier):
         raise DeviceError(
             "line leg (127.0.0.1:802): the line is lost, and with it hip drive, knee drive"
         )

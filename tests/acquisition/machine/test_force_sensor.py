@@ -31,7 +31,7 @@ def is_new(monkeypatch, rig_file):
             for count in counts:
                 instant[0] = next(now)
                 values = {"sequence": count, "force_x": 1.0, "force_y": 2.0, "force_z": 3.0}
-                words = sensor_.block.encode(values)
+                words = sensor_.reader.block.encode(values)
 
                 async def read(*_, words=words, **__):
                     return words

@@ -58,7 +58,7 @@ class Drive:
             }
             self.ring.append(self.number, values)
 
-    async def read(self, address, count, *, in_motion):
+    async def read(self, address, count, *, function, in_motion):
         self.asked.append(count)
         if address == RING.newest.address:
             return Block({"newest": RING.newest}).encode({"newest": self.number % 65536})

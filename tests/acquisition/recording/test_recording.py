@@ -25,7 +25,7 @@ from pipelines.settings.acquire import RunSettings
 from pipelines.settings.rig import load_rig
 from tests.acquisition.conftest import free_port
 
-pytestmark = pytest.mark.usefixtures("any_rate")
+pytestmark = [pytest.mark.usefixtures("any_rate"), pytest.mark.long]
 
 LOCKSTEP = {'clock = "real_time"': 'clock = "lockstep"'}
 QUEUE = {

@@ -21,6 +21,8 @@ from tests.campaigns.blind.fixed_set import Outcome, complaints, outcomes, read
 from tests.campaigns.blind.plan import HIP, KNEE
 from tests.campaigns.blind.seeds import uses
 
+pytestmark = pytest.mark.long
+
 OUTCOMES = [
     Outcome(seed, "backlash@knee", "explained", "backlash@knee", True)
     for seed in range(900_000, 900_005)

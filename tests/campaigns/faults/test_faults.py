@@ -9,6 +9,8 @@ from tests.campaigns.faults.faults import WATCHDOG_S, cases
 from tests.campaigns.faults.proxy import RtuFrame, TcpFrame
 from tests.campaigns.faults.runs import RATE, run_through
 
+pytestmark = pytest.mark.long
+
 
 def silence_s(why):
     """Return for how long, by its reason, a run got no credible answer."""

@@ -1,0 +1,263 @@
+"""A recording of a machine that its own controller moves: exoid reads, and writes nothing to it.
+
+The rows are numbered by the first device's counter, or by this computer's clock where it has none.
+They have the time of that device's clock, or the middle between request and answer. The metadata
+give the uncertainty of a row's time.
+"""
+
+import asyncio
+import logging
+import time
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from pipelines.acquisition.machine.read_only import ReadOnlyMachine, ReadOnlyRow
+from pipelines.acquisition.modbus.exclusive_access import exclusive_access
+from pipelines.acquisition.modbus.file_lock import locked
+from pipelines.acquisition.pacing import PhaseLock
+from pipelines.acquisition.recording.journal import Journal
+from pipelines.acquisition.recording.journal_file import refuse_leftover
+from pipelines.acquisition.run_outcome import Outcome, record_journal
+from pipelines.acquisition.stop_signals import collected_signals, until_signal
+from pipelines.acquisition.uninterrupted import run_to_its_end
+from pipelines.contracts import RECORDING
+from pipelines.contracts.atomic import open_folder
+from pipelines.contracts.provenance import describe
+from pipelines.contracts.run_paths import journal_of
+from pipelines.errors import DeviceError, ExoidError, SettingsError, about
+from pipelines.process.priority import urgent
+from pipelines.settings.acquire import RunSettings
+from pipelines.settings.mechanism import MechanismSettings
+from pipelines.settings.rig.recording_only import RecordingRig, load_recording_rig
+
+Report = Callable[[float, int], None]
+"""Takes the time since the recording began, s, and the number of rows."""
+
+
+def record_only(
+    rig_path: Path,
+    run: RunSettings,
+    output: Path,
+    sample_rate_hz: float,
+    mechanism: MechanismSettings,
+    report: Report = lambda seconds, rows: None,
+    claim: Callable[[], None] = lambda: None,
+) -> Outcome:
+    """Record one run without moving anything.
+
+    Parameters
+    ----------
+    rig_path : Path
+        A recording-only rig file.
+    run : RunSettings
+        Its duration counts from the first row.
+    output : Path
+        The recording; its journal and its name after an early end are those of other runs.
+    sample_rate_hz : float
+        Rows a second; that of the first device's counter, where it has one.
+    mechanism : MechanismSettings
+        Joints and geometry.
+    report : callable
+        Called about once a second.
+    claim : callable
+        Called once no other run can record to ``output`` any more.
+
+    Raises
+    ------
+    ExoidError
+        The recording was refused or ended early; DeviceError where a device was the reason.
+    """
+    rig = load_recording_rig(rig_path)
+    with about(rig_path):
+        _refuse_other_joints(rig, mechanism)
+    RECORDING.refuse_place(output)
+    journal_path = journal_of(output)
+    refuse_leftover(journal_path)
+    open_folder(output.parent)
+    metadata = _metadata(rig, run, mechanism, sample_rate_hz)
+    config = {
+        "run": run.model_dump(mode="json"),
+        "acquire": {"sample_rate_hz": sample_rate_hz},
+        "rig": rig.public(),
+    }
+    metadata |= describe([rig_path], config)
+    logging.getLogger("pymodbus").setLevel(logging.CRITICAL)  # our errors say it
+    with exclusive_access(rig), urgent(), collected_signals() as stopped_by:
+        recorder = _Recorder(rig, run, sample_rate_hz, stopped_by, report)
+        run_to_its_end(recorder.record(journal_path, metadata, claim), recorder.stop)
+        with locked(journal_path) as lock:
+            text = recorder.why or "the recording is complete"
+            kind = DeviceError if recorder.fault is None else ExoidError
+            return record_journal(output, lock, kind, text, recorder.fault)
+
+
+def _refuse_other_joints(rig: RecordingRig, mechanism: MechanismSettings) -> None:
+    """Refuse joints that are not those of the experiment's mechanism, or that slide."""
+    recorded, expected = [joint.joint for joint in rig.drive], mechanism.all_joints
+    if recorded != [joint.name for joint in expected]:
+        raise SettingsError(
+            f"drive: found joints {', '.join(recorded)}, expected those of [mechanism]:"
+            f" {', '.join(joint.name for joint in expected)}"
+        )
+    for joint in expected:
+        if joint.kind != "revolute":
+            raise SettingsError(
+                f"drive: {joint.name} slides, and only turning joints are recorded; use"
+                " `exoid import` for its log"
+            )
+
+
+def _metadata(
+    rig: RecordingRig, run: RunSettings, mechanism: MechanismSettings, sample_rate_hz: float
+) -> dict[str, Any]:
+    loops = {name: loop.model_dump(exclude_none=True) for name, loop in rig.controller.items()}
+    return {
+        "run": run.run,
+        "purpose": run.purpose,
+        "sample_rate_hz": sample_rate_hz,
+        "rig": rig.name,
+        "recording_only": True,
+        "controller": loops,
+        "geometry": mechanism.geometry | rig.geometry.model_dump(exclude_none=True),
+        "joints": [{"name": joint.joint, "kind": "revolute"} for joint in rig.drive],
+    }
+
+
+class _Recorder:
+    """One recording while it goes on."""
+
+    def __init__(
+        self,
+        rig: RecordingRig,
+        run: RunSettings,
+        rate_hz: float,
+        stopped_by: Sequence[str],
+        report: Report,
+    ) -> None:
+        self._rig = rig
+        self._rate_hz, self._planned = rate_hz, round(run.duration_s * rate_hz)
+        self._watchdog_s = rig.safety.watchdog_s
+        self._stopped_by, self._report = stopped_by, report
+        self._widths: list[float] = []
+        """Time from the first request of a row to its last answer, s."""
+        self.why: str | None = None
+        """Why it ended early."""
+        self.fault: BaseException | None = None
+        """An error of exoid's own that ended it."""
+
+    def stop(self, error: BaseException) -> None:
+        """End with a reason; the first one counts."""
+        if self.why is None:
+            self.why = str(error) or type(error).__name__
+            self.fault = None if isinstance(error, DeviceError | KeyboardInterrupt) else error
+
+    async def record(self, path: Path, metadata: dict[str, Any], claim: Callable[[], None]) -> None:
+        """Connect, then write every row to the journal, which ends with the reason of a stop."""
+        machine = ReadOnlyMachine(self._rig)
+        try:
+            await until_signal(machine.connect(), self._stopped_by)
+            with Journal(path, ["time_s", *machine.columns, "sequence"], metadata) as journal:
+                claim()
+                try:
+                    await self._follow(machine, journal)
+                except BaseException as error:
+                    self.stop(error)
+                journal.end(self.why, {"reading": self._reading(machine)})
+        finally:
+            machine.close()
+
+    async def _follow(self, machine: ReadOnlyMachine, journal: Journal) -> None:
+        """Read rows until the last one is written."""
+        pace = (
+            _CounterPace(machine, self._rate_hz, self._watchdog_s)
+            if machine.has_counter
+            else _HostPace(self._rate_hz)
+        )
+        answered_at = reported_at = time.monotonic()
+        number = -1
+        while number < self._planned - 1:
+            await pace.wait()
+            if self._stopped_by:
+                raise DeviceError(f"stopped by {self._stopped_by[0]}")
+            row, now = await machine.row(), time.monotonic()
+            placed = pace.place(row) if row else None
+            if placed and placed[0] > number:
+                assert row
+                number, answered_at = placed[0], now
+                if number < self._planned:
+                    self._widths.append(row.answered - row.asked)
+                    journal.append([placed[1], *row.values, number])
+            if now - answered_at > self._watchdog_s:
+                raise DeviceError(
+                    f"no new sample of all devices for {self._watchdog_s:g} s"
+                    " (safety.watchdog_s); check the machine and its lines"
+                )
+            if now - reported_at >= 1.0:
+                reported_at = now
+                self._report((number + 1) / self._rate_hz, journal.rows)
+
+    def _reading(self, machine: ReadOnlyMachine) -> dict[str, Any]:
+        """Return how rows were timed, for the recording's metadata."""
+        clock = "device" if machine.has_clock else "host"
+        if not self._widths:
+            return {"clock": clock}
+        # The sample was taken at an unknown instant between request and answer.
+        median, p99, longest = (0.5 * np.quantile(self._widths, [0.5, 0.99, 1.0])).tolist()
+        return {
+            "clock": clock,
+            "uncertainty_median_s": median,
+            "uncertainty_p99_s": p99,
+            "uncertainty_longest_s": longest,
+        }
+
+
+class _HostPace:
+    """Rows by this computer's clock, which begins with the first one."""
+
+    def __init__(self, rate_hz: float) -> None:
+        self._rate_hz = rate_hz
+        self._began: float | None = None
+        self._next = 1
+
+    async def wait(self) -> None:
+        """Wait until the next row is due; those that are late are left out."""
+        if self._began is None:
+            return
+        passed = (time.perf_counter() - self._began) * self._rate_hz
+        self._next = max(self._next, int(np.ceil(passed)))
+        await asyncio.sleep((self._next - passed) / self._rate_hz)
+        self._next += 1
+
+    def place(self, row: ReadOnlyRow) -> tuple[int, float]:
+        """Return the number and the time (s) of a row."""
+        middle = 0.5 * (row.asked + row.answered)
+        if self._began is None:
+            self._began = middle
+        return round((middle - self._began) * self._rate_hz), middle - self._began
+
+
+class _CounterPace:
+    """Rows by the first device's counter."""
+
+    def __init__(self, machine: ReadOnlyMachine, rate_hz: float, watchdog_s: float) -> None:
+        self._machine = machine
+        self._pace = PhaseLock(rate_hz, machine.count, watchdog_s)
+        self._last: int | None = None
+        self._first: tuple[int, float] | None = None
+
+    async def wait(self) -> None:
+        """Wait until the device has a new sample."""
+        if self._last is None:
+            self._last = await self._machine.count()
+        await self._pace.wait(self._last)
+
+    def place(self, row: ReadOnlyRow) -> tuple[int, float]:
+        """Return the number and the time (s) of a row."""
+        assert row.sequence is not None  # the device has a counter
+        self._last = row.sequence
+        seconds = row.time if row.time is not None else 0.5 * (row.asked + row.answered)
+        self._first = self._first or (row.sequence, seconds)
+        return row.sequence - self._first[0], seconds - self._first[1]

@@ -1,0 +1,122 @@
+"""Rows faster than the bus: values that are held until the next message comes."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipelines.importing.finding import Finding
+from pipelines.importing.time.clock import Run
+from pipelines.signals.sampling import missing_samples, sample_rate
+
+MANY = 10
+"""Least number of new values."""
+
+
+def new_values(values: NDArray) -> NDArray:
+    """Return the rows in which a value differs from the last one, (k,).
+
+    Parameters
+    ----------
+    values : (n,) array
+        In any unit, NaN where missing.
+    """
+    known = np.flatnonzero(np.isfinite(values))
+    return known[np.diff(values[known], prepend=np.nan) != 0.0]
+
+
+def are_held(values: NDArray) -> bool:
+    """Return whether values repeat because new ones come less often than rows.
+
+    Coarse readings repeat, too, but go on by their smallest step. Held ones jump over many.
+
+    Parameters
+    ----------
+    values : (n,) array
+        In any unit, NaN where missing.
+    """
+    new = new_values(values)
+    if len(new) < MANY:
+        return False
+    rows = np.diff(new)
+    # A joint that rests repeats its values for long, whether they are held or not.
+    rows = rows[rows <= 10 * np.median(rows)]
+    repeats = 1.0 - len(rows) / rows.sum()
+    steps = np.diff(np.unique(values[new]))
+    # Differences by rounding in float64 are no steps.
+    steps = steps[steps > 1e-9 * np.ptp(values[new])]
+    if not len(steps):
+        return False
+    jump = float(np.median(np.abs(np.diff(values[new])))) / float(steps.min())
+    # Noise whose median jump is so many steps repeats a reading by chance in a quarter of one in
+    # as many rows; some more is no chance.
+    return bool(repeats > 0.05 + 1.0 / jump)
+
+
+def remarks(run: Run, columns: Mapping[str, NDArray]) -> list[Finding]:
+    """Report the columns of a run that hold their values, with the rate of the new ones."""
+    rows_hz, found = sample_rate(run.time_s), []
+    for name, values in columns.items():
+        if are_held(values):
+            new_hz = sample_rate(run.time_s[new_values(values)])
+            seen = f"new values at {new_hz:.4g} Hz in rows at {rows_hz:.4g} Hz, repeated between"
+            found.append(Finding(name, seen, 'kept; set time.keep = "new" to leave repeats out'))
+    return found
+
+
+def only_new(
+    run: Run, columns: Mapping[str, NDArray], required: Sequence[str], findings: list[Finding]
+) -> tuple[Run, dict[str, NDArray]]:
+    """Return the rows of a run that bring new values, and the columns there.
+
+    Parameters
+    ----------
+    run : Run
+        n rows.
+    columns : mapping of str to (n,) array
+        Quantities, NaN where missing.
+    required : sequence of str
+        Columns that a recording needs, the torque last. It has the instants of the result; others
+        that are held and change at other instants are interpolated.
+    findings : list of Finding
+        Extended by what was done.
+
+    Returns
+    -------
+    Run, dict
+        Of m rows.
+    """
+    held = {name: new_values(values) for name, values in columns.items() if are_held(values)}
+    bases = [name for name in required if name in held]
+    if not bases:
+        findings.append(Finding("time", "no angle or torque repeats its values", "all rows kept"))
+        return run, dict(columns)
+    base = bases[-1]
+    together = {name for name, new in held.items() if _coincide(new, held[base])}
+    # A value may come again as it was, while another of its message is new.
+    rows = np.unique(np.concatenate([held[name] for name in together]))
+    kept = {name: values[rows] for name, values in columns.items()}
+    time_s = run.time_s[rows]
+    seen = f"new values at {sample_rate(time_s):.4g} Hz in rows at {sample_rate(run.time_s):.4g} Hz"
+    action = f"{len(run) - len(rows)} rows that repeat {', '.join(sorted(together))} left out"
+    findings.append(Finding("time", seen, action))
+    for name in held.keys() - together:
+        kept[name] = _between(run.time_s[held[name]], columns[name][held[name]], time_s)
+        seen = "new values at other instants than the torque's"
+        findings.append(Finding(name, seen, "interpolated linearly between them"))
+    began_s = run.began_s + float(time_s[0])
+    return replace(run, rows=run.rows[rows], time_s=time_s - time_s[0], began_s=began_s), kept
+
+
+def _coincide(one: NDArray, other: NDArray) -> bool:
+    """Return whether most rows (k,) of the rarer of two channels are also of the other."""
+    return len(np.intersect1d(one, other)) > 0.8 * min(len(one), len(other))
+
+
+def _between(time: NDArray, values: NDArray, at: NDArray) -> NDArray:
+    """Return values (n,) interpolated at other times (m,), NaN outside and across gaps."""
+    result = np.interp(at, time, values, left=np.nan, right=np.nan)
+    before = np.clip(np.searchsorted(time, at, "right") - 1, 0, len(time) - 2)
+    result[(missing_samples(time) > 0)[before] & (at != time[before])] = np.nan
+    return result
