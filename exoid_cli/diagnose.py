@@ -80,7 +80,10 @@ def diagnose(
     machine, geometry = motions[0].machine, motions[0].geometry
     sections = ("mechanism", "filter", "diagnose")
     used_settings = settings.sections_about(machine.is_exoskeleton, *sections)
-    shared = {"joints": machine.joint_metadata} | describe(files, used_settings)
+    shared = {
+        "joints": machine.joint_metadata,
+        "geometry": machine.metadata(geometry),
+    } | describe(files, used_settings)
     recordings = {}
     if diagnosis.each_run:  # hashing reads whole files
         for motion, path in zip(motions, files, strict=True):
@@ -88,7 +91,6 @@ def diagnose(
     model = {
         "covariance": diagnosis.covariance.tolist(),
         "mechanism": machine.mechanism.name,
-        "geometry": machine.metadata(geometry),
         "method": {"name": "joint fit of baseline and named causes", "status": diagnosis.status},
         "collinear": diagnosis.collinear,
         "unrealizable": diagnosis.unrealizable,

@@ -26,6 +26,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipelines.contracts.joint_units import Scale, refuse_unknown_unit, unit_at
+from pipelines.contracts.joints import Joint
 from pipelines.effects.kernel import address, columns_along, columns_along_with_memory, read_along
 from pipelines.mechanics.machine import THE_LEG, Machine
 from pipelines.mechanics.motion import Motion
@@ -240,6 +241,10 @@ class Effect(ABC):
     For the whole machine, the first joint counts."""
     holds: ClassVar[bool] = False
     """True if it increases the torque that can hold a joint at rest."""
+    needs_torque: ClassVar[bool] = False
+    """True if it shows only in a drive's torque: a passive joint does not have it."""
+    limits_travel: ClassVar[bool] = False
+    """True if no joint that turns without end can have it, such as a spring or a stop."""
     whole_leg: ClassVar[bool] = False
     acts_in: ClassVar[tuple[str, ...]] = RUNS
     linear: ClassVar[tuple[Parameter, ...]] = ()
@@ -367,7 +372,15 @@ class Effect(ABC):
             if place in shows_at
             and (cls.joints is None or place in cls.joints)
             and place not in cls.absorbed
+            and cls._fits(machine.joint(name))
         ]
+
+    @classmethod
+    def _fits(cls, joint: Joint) -> bool:
+        """Return whether a joint with such a drive and travel can have it."""
+        # Where the torque is unknown, nothing at the joint shows.
+        drives = ("measured",) if cls.needs_torque else ("measured", "none")
+        return joint.drive in drives and not (cls.limits_travel and joint.turns)
 
     @property
     def scale(self) -> Scale:

@@ -175,7 +175,8 @@ class Training:
         parts = tuple(compress(self.regressions(run)) for run in self.runs)
         # Compressed rows show a torque of zero, but not a constant one: that needs the samples.
         for j, joint in enumerate(self.runs[0].machine.joints if self.runs else ()):
-            if all(part.count[j] > 0 and not part.torque[j].any() for part in parts):
+            is_zero = all(part.count[j] > 0 and not part.torque[j].any() for part in parts)
+            if joint.drive == "measured" and is_zero:
                 raise silent_torque(self.runs, joint, 0.0)
         return parts
 

@@ -31,6 +31,8 @@ class Channel:
     required: bool
     enabled: str | None = None
     """Column that is 0 where the reading is not valid."""
+    turns: bool = False
+    """Whether it is the angle of a joint that turns without end."""
 
 
 @dataclass(frozen=True)
@@ -130,7 +132,9 @@ class Log:
                 f"{channel.where}: {', '.join(names)} have one row each, expected one a stamp"
             )
         note = noting(channel.target, findings)
-        return quantity(channel.reading, channel.gain, picked, channel.target, note)
+        return quantity(
+            channel.reading, channel.gain, picked, channel.target, note, turns=channel.turns
+        )
 
     def _interpolated(self, channel: Channel, run: Run, findings: list[Finding]) -> NDArray:
         """Return a channel with a clock of its own, interpolated linearly at a run's instants."""
@@ -141,7 +145,7 @@ class Log:
         if {len(values) for values in columns.values()} - {1, len(stamps)}:
             raise InputError(f"{channel.where} and its clock {reading.time!r} differ in length")
         note = noting(channel.target, findings)
-        values = quantity(reading, channel.gain, columns, channel.target, note)
+        values = quantity(reading, channel.gain, columns, channel.target, note, turns=channel.turns)
         known = np.isfinite(values)
         # Both clocks count from one origin, the first stamp of the log's own clock.
         since = clock.seconds(stamps[known], self.origin, self.settings, of_time)
@@ -221,6 +225,7 @@ def _channels(settings: ImportMap) -> Iterator[Channel]:
                 required=name in ("angle", "torque"),
                 # While a drive is off only its torque is no measurement; the encoder still is one.
                 enabled=joint.enabled if name == "torque" else None,
+                turns=joint.turns and name in ("angle", "reference"),
             )
     for i, force in enumerate(settings.force):
         yield Channel(force.target, f"force[{i}]", force, 1.0, required=False)

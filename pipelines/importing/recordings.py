@@ -143,6 +143,12 @@ def _recordings_of(
     note = noting("time", findings)
     _note_sampling(sampling, note)
     columns = {"time_s": time} | {name: values[whole] for name, values in columns.items()}
+    # A passive joint's torque is known to be zero, and an unknown one is not used.
+    columns |= {
+        joint.joint.column("torque"): np.zeros(len(time))
+        for joint in settings.joint
+        if joint.drive != "measured"
+    }
     _check_values(columns, settings)
     _check_periods(wanted, float(run.time_s[-1]))
     _note_period(columns, settings, wanted, note)
@@ -237,11 +243,18 @@ def _check_values(columns: Mapping[str, NDArray], settings: ImportMap) -> None:
     """Refuse an angle or torque that no joint has."""
     # N·m or N; far more than any drive delivers at a joint.
     largest_torque = 1e6
+    limited = plausibility.limited(settings)
     for i, joint in enumerate(settings.joint):
-        turns = joint.kind == "revolute"
-        angle = ("angle", LARGEST_ANGLE_RAD, "rad", "zero, counts_per_turn or wraps_at")
-        torque = ("torque", largest_torque, "N·m" if turns else "N", "scale or gains")
-        for quantity, most, unit, also in (angle, torque) if turns else (torque,):
+        unit = joint.joint.unit("torque")
+        angle = (
+            "angle",
+            LARGEST_ANGLE_RAD,
+            "rad",
+            "zero, counts_per_turn or wraps_at; or set turns = true for a joint that turns without"
+            " end",
+        )
+        torque = ("torque", largest_torque, unit, "scale or gains")
+        for quantity, most, unit, also in (angle, torque) if limited[i] else (torque,):
             values = columns[joint.joint.column(quantity)]
             beyond = np.flatnonzero(np.abs(values) > most)
             if len(beyond):
@@ -333,7 +346,7 @@ def _metadata(
         "geometry": settings.geometry.model_dump(exclude_none=True) or None,
     }
     return {
-        "joints": [{"name": joint.name, "kind": joint.kind} for joint in settings.joint],
+        "joints": [joint.joint.metadata for joint in settings.joint],
         "run": recording.run,
         "purpose": recording.purpose,
         "sample_rate_hz": sampling.rate_hz,

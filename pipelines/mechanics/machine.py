@@ -65,9 +65,9 @@ class Machine:
         return tuple(joint.name for joint in self.joints)
 
     @property
-    def joint_metadata(self) -> list[dict[str, str]]:
+    def joint_metadata(self) -> list[dict[str, Any]]:
         """Its joints for a file's metadata."""
-        return [{"name": joint.name, "kind": joint.kind} for joint in self.joints]
+        return [joint.metadata for joint in self.joints]
 
     def joint(self, name: str) -> Joint:
         """Return the joint of a name."""

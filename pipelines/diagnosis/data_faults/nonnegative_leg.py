@@ -96,9 +96,10 @@ def averages(motion: Motion) -> Averages | None:
     Returns
     -------
     Averages or None
-        None where the machine has no second joint, or too few blocks are valid.
+        None where the machine has no second drive, or too few blocks are valid.
     """
-    if motion.machine.mechanism is not LEG:
+    drives = [joint.drive for joint in motion.machine.joints]
+    if motion.machine.mechanism is not LEG or set(drives) != {"measured"}:
         return None
     block = BlockAverage.lasting(BLOCK_S, motion.sample_rate_hz)
     starts = block.starts(motion.segment)

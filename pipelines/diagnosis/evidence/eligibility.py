@@ -138,10 +138,11 @@ def _rounded_down(seconds: float) -> float:
 
 def _refuse_dead_torque(motions: Sequence[Motion], joint: int) -> None:
     """Raise InputError for a torque that is constant while its joint moves."""
+    here = motions[0].machine.joints[joint]
     values = np.concatenate([m.torque[m.valid, joint] for m in motions])
-    if len(values) and np.ptp(values) == 0.0:
+    if here.drive == "measured" and len(values) and np.ptp(values) == 0.0:
         # Adding zero turns a -0.0 into 0.0 in the message.
-        raise silent_torque(motions, motions[0].machine.joints[joint], float(values[0]) + 0.0)
+        raise silent_torque(motions, here, float(values[0]) + 0.0)
 
 
 def _refuse_dead_angle(motions: Sequence[Motion], joint: int) -> None:
