@@ -356,7 +356,7 @@ class Effect(ABC):
             Names of joints; ``[None]`` if it belongs to the whole machine.
         """
         mechanism = machine.mechanism
-        if cls.absorbed_as in mechanism.absorbs:
+        if cls.absorbed_as in machine.absorbs:
             return []
         if cls.mechanism_equation and cls.mechanism_equation not in mechanism.reactions:
             return []

@@ -311,6 +311,10 @@ class ImportMap(Settings):
 
     @model_validator(mode="after")
     def _fits_together(self) -> Self:
+        if all(joint.drive != "measured" for joint in self.joint):
+            raise ValueError(
+                "joint: none has a torque, expected one at least: it fixes the scale of inertia"
+            )
         for name in repeated(joint.name for joint in self.joint):
             raise ValueError(f"joint: found {name} twice, expected each name once; rename one")
         for target in repeated(force.target for force in self.force):
