@@ -80,10 +80,7 @@ def diagnose(
     machine, geometry = motions[0].machine, motions[0].geometry
     sections = ("mechanism", "filter", "diagnose")
     used_settings = settings.sections_about(machine.is_exoskeleton, *sections)
-    shared = {
-        "joints": machine.joint_metadata,
-        "geometry": machine.metadata(geometry),
-    } | describe(files, used_settings)
+    shared = {"joints": machine.joint_metadata} | describe(files, used_settings)
     recordings = {}
     if diagnosis.each_run:  # hashing reads whole files
         for motion, path in zip(motions, files, strict=True):
@@ -111,7 +108,9 @@ def diagnose(
     # The verdict last: whoever sees it finds the tables of the same diagnosis next to it.
     with all_or_none(output, last="verdict.json") as folder:
         for name, contract in tables.items():
-            metadata = shared | (model if name == "parameters" else {})
+            # Without gravity, angles of residuals have no limit.
+            metadata = shared | {"geometry": machine.metadata(geometry)}
+            metadata |= model if name == "parameters" else {}
             contract.write(folder / f"{name}.parquet", frames[name], metadata)
         for name, content in (("detectability", detectable), ("verdict", document)):
             text = json.dumps(content | {"provenance": shared}, indent=1, ensure_ascii=False)

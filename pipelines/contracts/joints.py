@@ -43,8 +43,7 @@ class Joint:
     name: str
     kind: Kind = "revolute"
     drive: Drive = "measured"
-    """``none`` for a passive joint, whose torque is zero; ``unknown`` where it was not recorded, so
-    that the joint's motion is a known input."""
+    """``none`` for a passive joint, whose torque is zero."""
     turns: bool = False
     """True for a joint that turns without end."""
 
@@ -60,8 +59,13 @@ class Joint:
 
     def __str__(self) -> str:
         """Return its name and what it is, for messages."""
-        drive = {"measured": "", "none": ", no drive", "unknown": ", drive unknown"}[self.drive]
-        return f"{self.name} ({self.kind}{drive}{', turns without end' * self.turns})"
+        passive, endless = ", no drive" * self.is_passive, ", turns without end" * self.turns
+        return f"{self.name} ({self.kind}{passive}{endless})"
+
+    @property
+    def is_passive(self) -> bool:
+        """Whether it has no drive: its torque is zero, and no measurement."""
+        return self.drive == "none"
 
     def column(self, quantity: str) -> str:
         """Return a quantity's column: of ``"angle"``, ``hip_angle_rad`` or ``axis_position_m``."""

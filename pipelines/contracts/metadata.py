@@ -22,7 +22,7 @@ class JointKeys(Keys):
 
     name: Annotated[str, Field(pattern=r"^[a-z][a-z0-9_]*$")]
     kind: Literal["revolute", "prismatic"] = "revolute"
-    drive: Literal["measured", "none", "unknown"] = "measured"
+    drive: Literal["measured", "none"] = "measured"
     turns: bool = False
 
 

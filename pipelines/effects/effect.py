@@ -244,7 +244,8 @@ class Effect(ABC):
     needs_torque: ClassVar[bool] = False
     """True if it shows only in a drive's torque: a passive joint does not have it."""
     limits_travel: ClassVar[bool] = False
-    """True if no joint that turns without end can have it, such as a spring or a stop."""
+    """True if no joint that turns without end can have it: a spring or a stop, or an equation
+    between two ends of the travel."""
     whole_leg: ClassVar[bool] = False
     acts_in: ClassVar[tuple[str, ...]] = RUNS
     linear: ClassVar[tuple[Parameter, ...]] = ()
@@ -378,9 +379,7 @@ class Effect(ABC):
     @classmethod
     def _fits(cls, joint: Joint) -> bool:
         """Return whether a joint with such a drive and travel can have it."""
-        # Where the torque is unknown, nothing at the joint shows.
-        drives = ("measured",) if cls.needs_torque else ("measured", "none")
-        return joint.drive in drives and not (cls.limits_travel and joint.turns)
+        return not ((cls.needs_torque and joint.is_passive) or (cls.limits_travel and joint.turns))
 
     @property
     def scale(self) -> Scale:

@@ -187,7 +187,7 @@ class Training:
         level, mechanism = replace(run.geometry, gravity_m_s2=0.0), run.machine.mechanism
         inertias = {}
         for j, joint in enumerate(run.machine.joints):
-            if joint.drive != "none":
+            if not joint.is_passive:
                 continue
             inertias[j] = np.zeros(self.layout.size)
             for piece in run.pieces(0):
@@ -212,7 +212,7 @@ class Training:
         # Compressed rows show a torque of zero, but not a constant one: that needs the samples.
         for j, joint in enumerate(self.runs[0].machine.joints if self.runs else ()):
             is_zero = all(part.count[j] > 0 and not part.torque[j].any() for part in parts)
-            if joint.drive == "measured" and is_zero:
+            if is_zero and not joint.is_passive:
                 raise silent_torque(self.runs, joint, 0.0)
         return parts
 

@@ -219,7 +219,7 @@ def _about_passive_joints(training: Training) -> Training:
 
     They are linearized anew about each fit; two more fits suffice, as the first is nearly right.
     """
-    if all(joint.drive != "none" for joint in training.runs[0].machine.joints):
+    if not any(joint.is_passive for joint in training.runs[0].machine.joints):
         return training
     for _ in range(3):
         values = _values(_in_steps(training, WeightedLeastSquares()))

@@ -143,11 +143,11 @@ def _recordings_of(
     note = noting("time", findings)
     _note_sampling(sampling, note)
     columns = {"time_s": time} | {name: values[whole] for name, values in columns.items()}
-    # A passive joint's torque is known to be zero, and an unknown one is not used.
+    # The torque of a joint without a drive is known to be zero.
     columns |= {
         joint.joint.column("torque"): np.zeros(len(time))
         for joint in settings.joint
-        if joint.drive != "measured"
+        if joint.joint.is_passive
     }
     _check_values(columns, settings)
     _check_periods(wanted, float(run.time_s[-1]))

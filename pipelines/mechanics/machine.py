@@ -110,7 +110,7 @@ class Machine:
     def absorbs(self) -> Mapping[str, str]:
         """Kinds of torque that the parameters absorb completely, as ``Mechanism.absorbs``."""
         # The only drive fixes the scale of all parameters, so a gain of its torque does not show.
-        one_drive = sum(joint.drive == "measured" for joint in self.joints) == 1
+        one_drive = sum(not joint.is_passive for joint in self.joints) == 1
         gain = {"gain": "all parameters together"} if one_drive else {}
         return {**self.mechanism.absorbs, **gain}
 
@@ -144,7 +144,7 @@ def machine_of(
     InputError
         If no mechanism has such joints, or none of them a measured torque.
     """
-    if all(joint.drive != "measured" for joint in joints):
+    if all(joint.is_passive for joint in joints):
         raise InputError(
             f"{source or 'the machine'}: no joint of {in_words(joints)} has a measured torque,"
             " expected one at least, as it fixes the scale of inertia and friction"

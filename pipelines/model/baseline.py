@@ -35,8 +35,6 @@ def baseline(
     """
     # Without such data, both bodies would have the same columns.
     wearer = [RigidBody(run="with_human", on=machine)] * (len(kinds) == 2 or cuffs)
-    # Friction of a joint whose torque is unknown does not show.
-    with_friction = [joint.name for joint in machine.joints if joint.drive != "unknown"]
-    friction = (Friction(joint=name, on=machine) for name in with_friction)
+    friction = (Friction(joint=joint, on=machine) for joint in machine.names)
     zeros = [ForceSensorZero(on=machine)] * cuffs
     return (RigidBody(on=machine), *wearer, *friction, *known, *zeros)

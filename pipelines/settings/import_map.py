@@ -174,8 +174,7 @@ class JointSettings(Settings):
     kind: Kind = Field("revolute", description="revolute turns, prismatic slides.")
     drive: Drive = Field(
         "measured",
-        description='"none" for a passive joint, whose torque is zero; "unknown" where the log'
-        " lacks it.",
+        description='"none" for a passive joint: its torque is zero, and has no column.',
     )
     turns: bool = Field(False, description="Whether it turns without end: its angle has no limit.")
     enabled: str | None = Field(None, description="Column that is 0 while the drive is off.")
@@ -195,10 +194,8 @@ class JointSettings(Settings):
             raise ValueError(
                 'torque: missing; add it, or set drive = "none" for a joint without a drive'
             )
-        if self.drive != "measured" and self.torque is not None:
-            raise ValueError(
-                f"torque: found with drive = {self.drive!r}, expected none; remove one of them"
-            )
+        if self.drive == "none" and self.torque is not None:
+            raise ValueError('torque: found with drive = "none", expected none; remove one of them')
         if self.turns and self.kind == "prismatic":
             raise ValueError("turns: found at a prismatic joint, expected a revolute one")
         return self
@@ -311,9 +308,10 @@ class ImportMap(Settings):
 
     @model_validator(mode="after")
     def _fits_together(self) -> Self:
-        if all(joint.drive != "measured" for joint in self.joint):
+        if all(joint.drive == "none" for joint in self.joint):
             raise ValueError(
-                "joint: none has a torque, expected one at least: it fixes the scale of inertia"
+                "joint: none has a drive, expected one at least, as its torque fixes the scale of"
+                " inertia; give one a torque"
             )
         for name in repeated(joint.name for joint in self.joint):
             raise ValueError(f"joint: found {name} twice, expected each name once; rename one")

@@ -19,9 +19,7 @@ class JointSettings(Settings):
 
     name: str = Field(pattern="^[a-z][a-z0-9_]*$", description="Columns of files begin with it.")
     kind: Kind = Field("revolute", description='"revolute" or "prismatic".')
-    drive: Drive = Field(
-        "measured", description='"none" for a passive joint; "unknown" as in a map.'
-    )
+    drive: Drive = Field("measured", description='"none" for a passive joint.')
     turns: bool = Field(False, description="Whether it turns without end.")
 
 

@@ -98,8 +98,8 @@ def averages(motion: Motion) -> Averages | None:
     Averages or None
         None where the machine has no second drive, or too few blocks are valid.
     """
-    drives = [joint.drive for joint in motion.machine.joints]
-    if motion.machine.mechanism is not LEG or set(drives) != {"measured"}:
+    is_passive = any(joint.is_passive for joint in motion.machine.joints)
+    if motion.machine.mechanism is not LEG or is_passive:
         return None
     block = BlockAverage.lasting(BLOCK_S, motion.sample_rate_hz)
     starts = block.starts(motion.segment)

@@ -140,7 +140,7 @@ def _refuse_dead_torque(motions: Sequence[Motion], joint: int) -> None:
     """Raise InputError for a torque that is constant while its joint moves."""
     here = motions[0].machine.joints[joint]
     values = np.concatenate([m.torque[m.valid, joint] for m in motions])
-    if here.drive == "measured" and len(values) and np.ptp(values) == 0.0:
+    if len(values) and np.ptp(values) == 0.0 and not here.is_passive:
         # Adding zero turns a -0.0 into 0.0 in the message.
         raise silent_torque(motions, here, float(values[0]) + 0.0)
 

@@ -58,7 +58,7 @@ def varying_torque(runs: Sequence[Run], baseline: Baseline, values: NDArray) -> 
     (O,) array
         N·m.
     """
-    passive = [j for j, one in enumerate(baseline.machine.joints) if one.drive == "none"]
+    passive = [j for j, one in enumerate(baseline.machine.joints) if one.is_passive]
     squares, count = np.zeros(runs[0].measured.shape[1]), np.zeros(runs[0].measured.shape[1])
     for run in runs:
         known = np.where(run.usable, run.measured, 0.0)

@@ -93,7 +93,7 @@ def _still(columns: Mapping[str, NDArray], joint: JointSettings) -> Iterator[Fin
 
 def _torque_of(joint: JointSettings) -> tuple[str, ...]:
     """Return the quantity torque, if the log has it."""
-    return ("torque",) if joint.drive == "measured" else ()
+    return () if joint.joint.is_passive else ("torque",)
 
 
 def _too_short(columns: Mapping[str, NDArray], joint: JointSettings) -> Iterator[Finding]:
