@@ -23,8 +23,8 @@ TRUTH = [X1, X2, X3, X4, COULOMB[0], VISCOUS[0], COULOMB[1], VISCOUS[1]]
 def free_elbow(seed, seconds=16.0, speed=0.0, spring=0.0, noise=0.02, driven=0, rate_hz=200.0):
     """Return a log of time, angles and torques; ``noise`` is a share of the torque's rms.
 
-    The elbow begins with a speed, rad/s, and may have a spring of so many N·m/rad. ``driven`` is the
-    joint with a drive: 0 for the shoulder.
+    The elbow begins with a speed, rad/s, and may have a spring of so many N·m/rad. ``driven`` is
+    the joint with a drive: 0 for the shoulder.
     """
     phases = np.random.default_rng(seed).uniform(0.0, 2.0 * np.pi, 3)
     size = (1.0, 0.35)[driven]

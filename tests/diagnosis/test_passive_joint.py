@@ -1,4 +1,4 @@
-"""A verdict on an arm whose elbow has no drive: what is missing there shows in its balance alone."""
+"""A verdict on an arm whose elbow has no drive: what is missing shows in its balance."""
 
 import pytest
 

@@ -1,4 +1,4 @@
-"""A joint without a drive: its torque is zero and known, and its equation informs the whole body."""
+"""A joint without a drive: its torque is zero, and its equation informs the whole body."""
 
 from dataclasses import replace
 
@@ -37,7 +37,7 @@ def test_without_any_drive_the_scale_of_the_parameters_is_unknown():
     run, other = runs()
     joints = [entry | {"drive": "none"} for entry in run.metadata["joints"]]
     passive = [replace(m, metadata=m.metadata | {"joints": joints}) for m in (run, other)]
-    with pytest.raises(InputError, match="no joint of .* has a measured torque"):
+    with pytest.raises(InputError, match=r"no joint of .* has a measured torque"):
         identify(passive)
 
 
@@ -45,5 +45,5 @@ def test_the_torque_of_a_driven_joint_that_is_zero_is_still_refused():
     run, other = runs()
     joints = [{"name": entry["name"]} for entry in run.metadata["joints"]]
     driven = [replace(m, metadata=m.metadata | {"joints": joints}) for m in (run, other)]
-    with pytest.raises(InputError, match='elbow is 0 N·m .* has drive = "none"'):
+    with pytest.raises(InputError, match=r'elbow is 0 N·m .* has drive = "none"'):
         identify(driven)
