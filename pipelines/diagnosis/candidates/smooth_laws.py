@@ -25,8 +25,6 @@ BURSTS = "bursts"
 """The law of knocks at random times. It has no columns: its evidence is in the scatter."""
 QUANTISATION = "quantisation"
 """The law of a torque that is reported in coarse steps: its column is the rounding error."""
-FUNCTIONS = 10
-"""Number of functions of one angle, the constant among them."""
 
 
 @dataclass(frozen=True)
@@ -139,14 +137,11 @@ def _scaled_angle(run: Run, spans: Spans) -> NDArray:
 
 
 def _of_angle(run: Run, spans: Spans) -> list[NDArray]:
-    """Return functions of each joint's angle, (m, ``FUNCTIONS``), by degree.
-
-    They are Legendre polynomials of the scaled angle, or waves of a joint that turns without end.
-    """
-    scaled = _scaled_angle(run, spans)
+    """Return functions of each joint's angle, (m, degrees)."""
+    scaled, joints = _scaled_angle(run, spans), run.motion.machine.joints
     return [
-        _waves(run.state[0][:, j]) if joint.turns else legvander(scaled[:, j], FUNCTIONS - 1)
-        for j, joint in enumerate(run.motion.machine.joints)
+        _waves(run.state[0][:, j]) if joint.turns else _polynomials(scaled[:, j])
+        for j, joint in enumerate(joints)
     ]
 
 
@@ -155,15 +150,19 @@ def _of_sum(run: Run, spans: Spans) -> NDArray:
     sums = run.state[0].sum(axis=1)
     if any(joint.turns for joint in run.motion.machine.joints):
         return _waves(sums)
-    scaled = np.clip((sums - spans.sum_middle) / spans.sum_half_range, -1.5, 1.5)
-    return legvander(scaled, FUNCTIONS - 1)
+    return _polynomials(np.clip((sums - spans.sum_middle) / spans.sum_half_range, -1.5, 1.5))
 
 
-def _waves(angle: NDArray) -> NDArray:
-    """Return 1, sin q, cos q, sin 2q, cos 2q ... of an angle (m,)."""
-    phase = np.outer(angle, np.arange(1, FUNCTIONS // 2 + 1))
+def _polynomials(x: NDArray, count: int = 10) -> NDArray:
+    """Return Legendre polynomials of a scaled angle, (m, count), by degree."""
+    return legvander(x, count - 1)
+
+
+def _waves(angle: NDArray, count: int = 10) -> NDArray:
+    """Return 1, sin q, cos q, sin 2q, cos 2q ... of an angle that repeats, (m, count)."""
+    phase = np.outer(angle, np.arange(1, count // 2 + 1))
     waves = np.stack([np.sin(phase), np.cos(phase)], axis=2).reshape(len(angle), -1)
-    return np.column_stack([np.ones(len(angle)), waves])[:, :FUNCTIONS]
+    return np.column_stack([np.ones(len(angle)), waves])[:, :count]
 
 
 def _across_joints(x: NDArray, spans: Spans) -> Iterator[tuple[int, NDArray]]:
@@ -200,7 +199,7 @@ def _laws_of(run: Run, spans: Spans, load: NDArray, j: int) -> Iterator[tuple[st
     v, a = run.state[1] / spans.speed, run.state[2] / spans.acceleration
     sign, tau = np.sign(run.state[1]), load / spans.torque
     here, way, force = v[:, j], sign[:, j], tau[:, j]
-    yield from _scaled("angle", q[j], range(FUNCTIONS))
+    yield from _scaled("angle", q[j], range(q[j].shape[1]))
     yield from _speed_laws(here, way)
     # Coulomb friction first, then viscous. Degree 0 of both is in the baseline.
     yield from _scaled("friction_by_angle", q[j], range(1, 5), way)
