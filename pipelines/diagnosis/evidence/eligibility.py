@@ -110,12 +110,15 @@ def _refuse_standstill(motions: Sequence[Motion]) -> None:
         _refuse_dead_angle(motions, j)
         lasts = _seconds(motions, [m[:, j] for m in moving])
         if lasts < least:
+            # A blocked joint makes a simpler machine of the others.
+            rests = len(machine.joints) > 1 and lasts == 0.0
+            simpler = ", or leave it out of the map if it rests" * rests
             raise InputError(
                 f"{files}: {the(joint.name)} moves for {_rounded_down(lasts):.1f} s (faster than"
                 f" {reversal_speeds(machine)[j]:.2g} {joint.unit('velocity')} and away from"
                 f" reversals), expected {least:.2g} s {together}; excite"
                 f" {('it', 'both joints', 'all joints')[min(len(machine.joints), 3) - 1]}, or"
-                " record longer. If it did move, check its encoder, and the units of angle and"
+                f" record longer{simpler}. If it did move, check its encoder, and the units of angle and"
                 f" time in {settings_of(motions[0])}"
             )
         _refuse_dead_torque(motions, j)
