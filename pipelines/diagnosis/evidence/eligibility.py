@@ -110,16 +110,14 @@ def _refuse_standstill(motions: Sequence[Motion]) -> None:
         _refuse_dead_angle(motions, j)
         lasts = _seconds(motions, [m[:, j] for m in moving])
         if lasts < least:
-            # A blocked joint makes a simpler machine of the others.
-            rests = len(machine.joints) > 1 and lasts == 0.0
-            simpler = ", or leave it out of the map if it rests" * rests
+            simpler = _simpler(motions[0]) if lasts == 0.0 else ""
             raise InputError(
                 f"{files}: {the(joint.name)} moves for {_rounded_down(lasts):.1f} s (faster than"
                 f" {reversal_speeds(machine)[j]:.2g} {joint.unit('velocity')} and away from"
                 f" reversals), expected {least:.2g} s {together}; excite"
                 f" {('it', 'both joints', 'all joints')[min(len(machine.joints), 3) - 1]}, or"
-                f" record longer{simpler}. If it did move, check its encoder, and the units of angle and"
-                f" time in {settings_of(motions[0])}"
+                f" record longer{simpler}. If it did move, check its encoder, and the units of"
+                f" angle and time in {settings_of(motions[0])}"
             )
         _refuse_dead_torque(motions, j)
     # Least time for which all joints of an exoskeleton move at once, s: errors are scored there.
@@ -158,7 +156,14 @@ def _refuse_dead_angle(motions: Sequence[Motion], joint: int) -> None:
             f"{', '.join(m.file for m in motions)}: the angle of {the(here.name)} is"
             f" {values[0]:.4g} {here.unit('angle')} in every row, expected a joint that moves;"
             f" check its encoder, and which channel {settings_of(motions[0])} reads"
+            f"{_simpler(motions[0])}"
         )
+
+
+def _simpler(motion: Motion) -> str:
+    """Return the way out for a blocked joint of several: the others are a simpler machine."""
+    several = len(motion.joints) > 1
+    return f", or leave it out of {settings_of(motion)} if it rests" if several else ""
 
 
 def _seconds(motions: Sequence[Motion], marked: Sequence[NDArray]) -> float:
