@@ -217,7 +217,7 @@ def _training(
 def _about_passive_joints(training: Training) -> Training:
     """Return the training with the equations of passive joints free of scale (``Training.about``).
 
-    They are linearized anew about each fit; two more fits suffice, as the first is nearly right.
+    They are linearized about each fit in turn; three suffice, as the first is nearly right.
     """
     if not any(joint.is_passive for joint in training.runs[0].machine.joints):
         return training

@@ -141,5 +141,5 @@ def sawtooth(values: NDArray, turns: Iterable[float]) -> float | None:
     known = values[np.isfinite(values)]
     reach = float(np.ptp(known)) if len(known) else 0.0
     largest = float(np.max(np.abs(np.diff(known)), initial=0.0))
-    # The tolerance is for rounded readings, such as 360.0 beside 0.0.
+    # The tolerance is for rounded readings, such as 360.0 for 359.98.
     return next((turn for turn in turns if reach <= 1.001 * turn and largest > 0.5 * turn), None)
