@@ -94,7 +94,6 @@ def diagnose(
     model = {
         "covariance": diagnosis.covariance.tolist(),
         "mechanism": machine.mechanism.name,
-        "geometry": machine.metadata(geometry),
         "method": {"name": "joint fit of baseline and named causes", "status": diagnosis.status},
         "collinear": diagnosis.collinear,
         "unrealizable": diagnosis.unrealizable,
@@ -115,7 +114,9 @@ def diagnose(
     # The verdict last: whoever sees it finds the tables of the same diagnosis next to it.
     with all_or_none(output, last="verdict.json") as folder:
         for name, contract in tables.items():
-            metadata = shared | (model if name == "parameters" else {})
+            # Without gravity, angles of residuals have no limit.
+            metadata = shared | {"geometry": machine.metadata(geometry)}
+            metadata |= model if name == "parameters" else {}
             contract.write(folder / f"{name}.parquet", frames[name], metadata)
         for name, content in (("detectability", detectable), ("verdict", document)):
             text = json.dumps(content | {"provenance": shared}, indent=1, ensure_ascii=False)

@@ -113,8 +113,11 @@ def identify(
     used_settings = settings.sections_about(runs[0].machine.is_exoskeleton, "mechanism", "filter")
     config_used = used_settings | {"identify": options.model_dump(mode="json")}
     inputs = [*files, causes] if causes else files
-    joints = {"joints": runs[0].machine.joint_metadata}
-    shared = joints | describe(inputs=inputs, config=config_used)
+    machine = runs[0].machine
+    shared = {
+        "joints": machine.joint_metadata,
+        "geometry": machine.metadata(runs[0].geometry),
+    } | describe(inputs=inputs, config=config_used)
     method_used = dict(model.method)
     if effect:
         method_used["effects"] = effect
@@ -122,7 +125,7 @@ def identify(
         # The last input, with its hash: the diagnosis whose causes are refitted.
         method_used["causes"] = shared["inputs"][-1]
     figures = _write(model, output, shared | {"method": method_used}, figures=options.figures)
-    _report(model, runs[0].machine)
+    _report(model, machine)
     console.wrote(output, "parameters.parquet", "residuals.parquet", *figures)
 
 
@@ -151,7 +154,6 @@ def _write(
     described = {
         "covariance": model.covariance.tolist(),
         "mechanism": run.machine.mechanism.name,
-        "geometry": run.machine.metadata(run.geometry),
         "one_step": model.one_step.tolist(),
         "validation": model.validation.as_json(),
         **_remarks(model),

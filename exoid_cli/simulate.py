@@ -104,6 +104,12 @@ def _track(
 
     chosen = settings.simulate
     plant = plant_from_table(table, run, geometry_from(settings))
+    passive = [joint.name for joint in plant.joints if joint.is_passive]
+    if passive:
+        raise InputError(
+            f"{table.path}: {passive[0]} has no drive, expected one at every joint for a"
+            " controller; give --replay to simulate under a recorded torque"
+        )
     if not reference and not plant.machine.is_exoskeleton:
         raise InputError(
             f"{table.path} is of {', '.join(plant.machine.names)}, expected hip and knee: the gait"

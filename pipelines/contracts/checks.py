@@ -162,7 +162,9 @@ def refuse_unknown_values(column: pa.ChunkedArray, choices: Sequence[str], where
         )
 
 
-def refuse_implausible(column: pa.ChunkedArray, unit: str, where: Place) -> None:
+def refuse_implausible(
+    column: pa.ChunkedArray, unit: str, where: Place, *, turns: bool = False
+) -> None:
     """Refuse numbers that no machine's quantity reaches, and angles that no leg reaches in radians.
 
     Parameters
@@ -173,6 +175,8 @@ def refuse_implausible(column: pa.ChunkedArray, unit: str, where: Place) -> None
         Their SI unit.
     where : Place
         Its place, for the message.
+    turns : bool, optional
+        Whether an angle may be of any number of turns.
 
     Raises
     ------
@@ -183,7 +187,7 @@ def refuse_implausible(column: pa.ChunkedArray, unit: str, where: Place) -> None
     limits = {
         1e12: ", expected at most 1e+12; correct the unit or scale of the column, or drop the row"
     }
-    if unit == "rad":
+    if unit == "rad" and not turns:
         limits[LARGEST_ANGLE_RAD] = (
             ", which looks like degrees; expected radians, multiply by pi/180"
         )

@@ -4,7 +4,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from pipelines.contracts.joint_units import Kind, unit_at
+from pipelines.contracts.joint_units import Drive, Kind, unit_at
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -42,6 +42,30 @@ class Joint:
 
     name: str
     kind: Kind = "revolute"
+    drive: Drive = "measured"
+    """``none`` for a passive joint, whose torque is zero."""
+    turns: bool = False
+    """True for a joint that turns without end."""
+
+    @property
+    def metadata(self) -> dict[str, Any]:
+        """Its entry of a file's ``joints``, without the usual values."""
+        entry: dict[str, Any] = {"name": self.name, "kind": self.kind}
+        if self.drive != "measured":
+            entry["drive"] = self.drive
+        if self.turns:
+            entry["turns"] = True
+        return entry
+
+    def __str__(self) -> str:
+        """Return its name and what it is, for messages."""
+        passive, endless = ", no drive" * self.is_passive, ", turns without end" * self.turns
+        return f"{self.name} ({self.kind}{passive}{endless})"
+
+    @property
+    def is_passive(self) -> bool:
+        """Whether it has no drive: its torque is zero, and no measurement."""
+        return self.drive == "none"
 
     def column(self, quantity: str) -> str:
         """Return a quantity's column: of ``"angle"``, ``hip_angle_rad`` or ``axis_position_m``."""
@@ -80,7 +104,7 @@ def columns_of(joints: Iterable[Joint], quantities: "Mapping[str, NDArray]") -> 
 
 def in_words(joints: Iterable[Joint]) -> str:
     """Return the joints with their kinds, for messages."""
-    return ", ".join(f"{joint.name} ({joint.kind})" for joint in joints)
+    return ", ".join(map(str, joints))
 
 
 def either(words: Iterable[str]) -> str:
@@ -105,5 +129,11 @@ def joints_of(metadata: Mapping[str, Any]) -> tuple[Joint, ...]:
     if "joints" not in metadata:
         return HIP_AND_KNEE
     return tuple(
-        Joint(joint["name"], joint.get("kind", "revolute")) for joint in metadata["joints"]
+        Joint(
+            joint["name"],
+            joint.get("kind", "revolute"),
+            joint.get("drive", "measured"),
+            joint.get("turns", False),
+        )
+        for joint in metadata["joints"]
     )

@@ -22,6 +22,8 @@ class JointKeys(Keys):
 
     name: Annotated[str, Field(pattern=r"^[a-z][a-z0-9_]*$")]
     kind: Literal["revolute", "prismatic"] = "revolute"
+    drive: Literal["measured", "none"] = "measured"
+    turns: bool = False
 
 
 class InputKeys(Keys):

@@ -36,11 +36,15 @@ class Column:
     """Whether values may be missing (null or NaN); infinities never may."""
     choices: tuple[str, ...] = ()
     per_joint: bool = False
+    turns: bool = False
+    """Whether an angle has no limit, because its joint turns without end."""
 
-    def at(self, joint: Joint) -> "Column":
-        """Return this quantity's column at one joint."""
+    def at(self, joint: Joint, is_level: bool) -> "Column":
+        """Return this quantity's column at one joint of a machine, with gravity or level."""
         name, unit = joint.column(self.name), joint.unit(self.name)
-        return replace(self, name=name, unit=unit, per_joint=False)
+        # Without gravity most torques do not depend on the turn, and no metadata need allow it.
+        turns = joint.turns or is_level
+        return replace(self, name=name, unit=unit, per_joint=False, turns=turns)
 
 
 def per_joint(
@@ -188,11 +192,15 @@ class Contract:
         """Name and version as written in a file: ``recording/1``."""
         return f"{self.name}/{self.version}"
 
-    def _columns_for(self, joints: tuple[Joint, ...]) -> tuple[Column, ...]:
+    def _columns_for(self, metadata: Mapping[str, Any]) -> tuple[Column, ...]:
         """Return every column by its name in a file, one for each joint."""
+        is_level = (metadata.get("geometry") or {}).get("gravity_m_s2") == 0.0
         columns: list[Column] = []
         for column in self.columns:
-            columns += [column.at(joint) for joint in joints] if column.per_joint else [column]
+            if column.per_joint:
+                columns += [column.at(joint, is_level) for joint in joints_of(metadata)]
+            else:
+                columns.append(column)
         return tuple(columns)
 
     def read(self, path: Path | str) -> Table:
@@ -403,7 +411,7 @@ class Contract:
             The table breaks the contract, or has no rows.
         """
         # Columns that the contract does not know are kept as they are.
-        known = self._columns_for(joints_of(metadata))
+        known = self._columns_for(metadata)
         columns = [c for c in known if named is None or c.name in named]
         rows, last_row = 0, None
         for piece in pieces:
@@ -470,7 +478,7 @@ class Contract:
             and column.unit
             and column.name != self.time
         ):
-            checks.refuse_implausible(values, column.unit, where)
+            checks.refuse_implausible(values, column.unit, where, turns=column.turns)
         about = {"unit": column.unit, "meaning": column.meaning}
         described = pa.field(column.name, column.dtype, metadata=about)
         return table.set_column(index, described, values)

@@ -74,7 +74,8 @@ class Diagnosis:
         """
         baseline, before, after = data.baseline, judged.before, judged.after
         fitted, validate = judged.scheme.runs, before.runs
-        known = uncertainty(after.fit, fitted, baseline, imperfection(fitted))
+        imperfect = imperfection(fitted, baseline, before.fit.values)
+        known = uncertainty(after.fit, fitted, baseline, imperfect)
         parameters, covariance = parameter_rows.parameters(after.fit, baseline, known)
         drift = simulation_error(before.fit, validate, baseline)
         # Without named causes both models are the same.

@@ -28,6 +28,7 @@ class Backlash(Effect):
     title = "Backlash"
     side = Side.DRIVE
     family = Family.TRANSMISSION
+    needs_torque = True
     resembles = ("load", "angle", "speed", "inertia_by_angle")
     forms_differ = "real play differs from tooth to tooth, and the link bounces in it"
     equation = "load angle = motor angle - play / 2 * sgn(transmitted torque)"

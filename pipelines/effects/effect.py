@@ -26,6 +26,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipelines.contracts.joint_units import Scale, refuse_unknown_unit, unit_at
+from pipelines.contracts.joints import Joint
 from pipelines.effects.kernel import address, columns_along, columns_along_with_memory, read_along
 from pipelines.mechanics.machine import THE_LEG, Machine
 from pipelines.mechanics.motion import Motion
@@ -240,6 +241,11 @@ class Effect(ABC):
     For the whole machine, the first joint counts."""
     holds: ClassVar[bool] = False
     """True if it increases the torque that can hold a joint at rest."""
+    needs_torque: ClassVar[bool] = False
+    """True if it shows only in a drive's torque: a passive joint does not have it."""
+    limits_travel: ClassVar[bool] = False
+    """True if no joint that turns without end can have it: a spring or a stop, or an equation
+    between two ends of the travel."""
     whole_leg: ClassVar[bool] = False
     acts_in: ClassVar[tuple[str, ...]] = RUNS
     linear: ClassVar[tuple[Parameter, ...]] = ()
@@ -351,7 +357,7 @@ class Effect(ABC):
             Names of joints; ``[None]`` if it belongs to the whole machine.
         """
         mechanism = machine.mechanism
-        if cls.absorbed_as in mechanism.absorbs:
+        if cls.absorbed_as in machine.absorbs:
             return []
         if cls.mechanism_equation and cls.mechanism_equation not in mechanism.reactions:
             return []
@@ -367,7 +373,13 @@ class Effect(ABC):
             if place in shows_at
             and (cls.joints is None or place in cls.joints)
             and place not in cls.absorbed
+            and cls._fits(machine.joint(name))
         ]
+
+    @classmethod
+    def _fits(cls, joint: Joint) -> bool:
+        """Return whether a joint with such a drive and travel can have it."""
+        return not ((cls.needs_torque and joint.is_passive) or (cls.limits_travel and joint.turns))
 
     @property
     def scale(self) -> Scale:

@@ -15,6 +15,7 @@ class EndStop(Effect):
     title = "End stop"
     side = Side.STRUCTURE
     family = Family.ANGLE
+    limits_travel = True
     resembles = ("angle", "both_angles")
     forms_differ = "a real stop has damping, and may engage a second part at a greater depth"
     equation = "tau = s k w (s (q - q0) / w)^p where s (q - q0) > 0, else 0; w = 0.1 rad"

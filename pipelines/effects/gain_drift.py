@@ -24,6 +24,7 @@ class GainDrift(Effect):
     title = "Gain drift"
     side = Side.SENSOR
     family = Family.TIME
+    needs_torque = True
     resembles = ("gain_over_time", "time")
     forms_differ = "a real gain may recover while the machine rests, and start elsewhere each time"
     equation = (

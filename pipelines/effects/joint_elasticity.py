@@ -23,6 +23,7 @@ class JointElasticity(Effect):
     title = "Joint elasticity"
     side = Side.DRIVE
     family = Family.TRANSMISSION
+    needs_torque = True
     resembles = ("load", "angle", "speed", "inertia_by_angle", "other_load")
     forms_differ = "a real gear hardens with its twist, and loses energy in a loop"
     equation = "torque = k twist (1 + h twist²); load angle = motor angle - twist"

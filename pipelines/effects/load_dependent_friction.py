@@ -13,6 +13,7 @@ class LoadDependentFriction(Effect):
     title = "Load-dependent friction"
     side = Side.DRIVE
     family = Family.LOAD
+    needs_torque = True
     resembles = ("load", "speed", "friction_by_angle")
     forms_differ = "a real share changes with the speed and along the gear"
     holds = True

@@ -19,6 +19,7 @@ class ParallelSpring(Effect):
     title = "Parallel spring"
     side = Side.STRUCTURE
     family = Family.ANGLE
+    limits_travel = True
     resembles = ("angle", "both_angles")
     forms_differ = "a real spring hardens, goes slack at one end, or pulls at a lever that turns"
     equation = "tau = k (q - q0) = k q - b"

@@ -18,6 +18,7 @@ class PassiveJointTorque(Effect):
     title = "Passive joint torque"
     side = Side.HUMAN
     family = Family.PERSON
+    limits_travel = True
     resembles = ("angle", "both_angles")
     forms_differ = "real muscles cross the next joint too, and lose energy when they are stretched"
     equation = "tau = k w (exp((q - q0) / w) - 1) beyond q0 on the side of w's sign, else 0"

@@ -15,6 +15,7 @@ class PositionDependentFriction(Effect):
     title = "Position-dependent friction"
     side = Side.DRIVE
     family = Family.ANGLE
+    limits_travel = True
     any_form = "friction_by_angle"
     resembles = ("friction_by_angle", "angle", "speed")
     forms_differ = "a real level may have a peak at one angle, and change the viscous friction too"

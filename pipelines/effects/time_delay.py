@@ -18,6 +18,7 @@ class TimeDelay(Effect):
     title = "Time delay"
     side = Side.SENSOR
     family = Family.SENSOR
+    needs_torque = True
     resembles = ("load", "speed", "inertia_by_angle")
     forms_differ = "a real channel is a filter, whose delay depends on the frequency"
     equation = "measured torque(t) = true torque(t - delay)"

@@ -17,6 +17,7 @@ class TorqueCrossTalk(Effect):
     title = "Torque cross-talk"
     side = Side.SENSOR
     family = Family.SENSOR
+    needs_torque = True
     resembles = ("other_load", "both_angles", "other_angle")
     forms_differ = "a real sensor may also measure bending forces, which no joint torque represents"
     equation = "measured torque = true torque + c * true torque of the other joint"

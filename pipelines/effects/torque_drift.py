@@ -15,6 +15,7 @@ class TorqueDrift(Effect):
     title = "Torque drift"
     side = Side.SENSOR
     family = Family.TIME
+    needs_torque = True
     resembles = ("time",)
     forms_differ = "a real zero wanders to and fro, and settles as the electronics warm"
     equation = "measured torque = true torque + level + rate t"

@@ -16,6 +16,7 @@ class TorqueGain(Effect):
     title = "Torque gain"
     side = Side.SENSOR
     family = Family.SENSOR
+    needs_torque = True
     resembles = ("load", "gain_over_time")
     forms_differ = "a real gain may differ with the sign of the torque, or fall at large ones"
     equation = "measured torque = gain * true torque"

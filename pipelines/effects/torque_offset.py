@@ -14,6 +14,7 @@ class TorqueOffset(Effect):
     title = "Torque offset"
     side = Side.SENSOR
     family = Family.SENSOR
+    needs_torque = True
     resembles = ("angle", "time")
     forms_differ = "a real zero creeps, and steps when the sensor is loaded"
     equation = "measured torque = true torque + offset"

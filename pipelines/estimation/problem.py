@@ -31,6 +31,9 @@ class Training:
     """Whether samples near reversals are fitted too."""
     cutoff_hz: float | None = None
     """Frequency above which nothing is fitted; None for no limit."""
+    about: NDArray | None = None
+    """(p,) values about which the equations of passive joints are made independent of the scale of
+    all parameters; None: they are fitted as they are."""
 
     @property
     def kinds(self) -> tuple[str, ...]:
@@ -161,7 +164,40 @@ class Training:
             if self.reversals:
                 # A sample is valid at all joints or none; only reversals are each joint's own.
                 r = replace(r, usable=np.repeat(r.valid[:, np.newaxis], r.torque.shape[1], 1))
-            yield r
+            yield self._free_of_scale(r, run)
+
+    def _free_of_scale(self, r: Regression, run: Run) -> Regression:
+        """Return the regression with the equation of each passive joint over its inertia.
+
+        The torque of a passive joint is exactly zero, and its acceleration is uncertain. So the
+        residual ``A x`` counts relative to the joint's inertia ``d x``, linearized about known
+        values. As it is, noise would favour values that are all too small.
+        """
+        if self.about is None:
+            return r
+        regressor, torque = r.regressor.copy(), r.torque.copy()
+        for j, inertia in self._inertias(run).items():
+            residual = torque[:, j] - regressor[:, j] @ self.about
+            regressor[:, j] += np.outer(residual, inertia / (inertia @ self.about))
+            torque[:, j] = residual
+        return replace(r, regressor=regressor, torque=torque)
+
+    def _inertias(self, run: Run) -> dict[int, NDArray]:
+        """Return the mean inertia at each passive joint of a run, per unit of the p columns."""
+        level, mechanism = replace(run.geometry, gravity_m_s2=0.0), run.machine.mechanism
+        inertias = {}
+        for j, joint in enumerate(run.machine.joints):
+            if not joint.is_passive:
+                continue
+            inertias[j] = np.zeros(self.layout.size)
+            for piece in run.pieces(0):
+                q = piece.motion.q[piece.core][piece.motion.valid[piece.core]]
+                still = np.zeros_like(q)
+                unit = still + np.eye(q.shape[1])[j]
+                own, rest = (mechanism.regressor(q, still, a, level)[:, j] for a in (unit, still))
+                for body in self.layout.bodies_in(run.run):
+                    inertias[j][body] += (own - rest).sum(axis=0)
+        return inertias
 
     @cached_property
     def compressed(self) -> tuple[Compressed, ...]:
@@ -175,7 +211,8 @@ class Training:
         parts = tuple(compress(self.regressions(run)) for run in self.runs)
         # Compressed rows show a torque of zero, but not a constant one: that needs the samples.
         for j, joint in enumerate(self.runs[0].machine.joints if self.runs else ()):
-            if all(part.count[j] > 0 and not part.torque[j].any() for part in parts):
+            is_zero = all(part.count[j] > 0 and not part.torque[j].any() for part in parts)
+            if is_zero and not joint.is_passive:
                 raise silent_torque(self.runs, joint, 0.0)
         return parts
 

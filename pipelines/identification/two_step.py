@@ -8,7 +8,7 @@ follows, and twice for the covariance of the residual.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any, Generic, TypeVar
 
@@ -134,6 +134,7 @@ def identify(
     loud = is_loud(train)
     refuse_unread(extension.terms, [*train, *judged])
     training, has_converged = _training(train, extension, reversals, CUTOFF_HZ if loud else None)
+    training = _about_passive_joints(training)
     # Torques that depend on load need it in validation runs too, from the fitted bodies.
     judged = [training.loaded(run) for run in judged]
     steps = {
@@ -211,6 +212,19 @@ def _training(
         alone = Training(whole, plain, reversals=reversals, cutoff_hz=cutoff_hz)
         bodies = _bodies(alone, _values(_in_steps(alone, WeightedLeastSquares())))
     return _with_consistent_loads(training, bodies)
+
+
+def _about_passive_joints(training: Training) -> Training:
+    """Return the training with the equations of passive joints free of scale (``Training.about``).
+
+    They are linearized about each fit in turn; three suffice, as the first is nearly right.
+    """
+    if not any(joint.is_passive for joint in training.runs[0].machine.joints):
+        return training
+    for _ in range(3):
+        values = _values(_in_steps(training, WeightedLeastSquares()))
+        training = replace(training, about=values)
+    return training
 
 
 def _body_keys(training: Training) -> list[str]:

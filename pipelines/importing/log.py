@@ -34,6 +34,8 @@ class Channel:
     """Column that is 0 where the reading is not valid."""
     time: str | None = None
     """Column of its clock, if that is not the clock of the log."""
+    turns: bool = False
+    """Whether it is the angle of a joint that turns without end."""
 
 
 @dataclass(frozen=True)
@@ -133,7 +135,9 @@ class Log:
                 f"{channel.where}: {', '.join(names)} have one row each, expected one a stamp"
             )
         note = noting(channel.target, findings)
-        return quantity(channel.reading, channel.gain, picked, channel.target, note)
+        return quantity(
+            channel.reading, channel.gain, picked, channel.target, note, turns=channel.turns
+        )
 
     def _interpolated(
         self, channel: Channel, column: str, run: Run, findings: list[Finding]
@@ -147,7 +151,7 @@ class Log:
         if {len(values) for values in columns.values()} - {1, len(stamps)}:
             raise InputError(f"{channel.where} and its clock {column!r} differ in length")
         note = noting(channel.target, findings)
-        values = quantity(reading, channel.gain, columns, channel.target, note)
+        values = quantity(reading, channel.gain, columns, channel.target, note, turns=channel.turns)
         if not np.isfinite(stamps).any():
             raise InputError(f"{where} has no time stamp in any row; correct the column")
         known = np.isfinite(values) & np.isfinite(stamps)
@@ -256,6 +260,7 @@ def _channels(settings: ImportMap, source: Source) -> Iterator[Channel]:
                 # While a drive is off only its torque is no measurement; the encoder still is one.
                 enabled=joint.enabled if name == "torque" else None,
                 time=_clock(reading, f"joint[{i}].{name}", settings, source),
+                turns=joint.turns and name in ("angle", "reference"),
             )
     for i, force in enumerate(settings.force):
         where = f"force[{i}]"

@@ -167,6 +167,12 @@ def _recordings_of(
     note = noting("time", findings)
     _note_sampling(sampling, note)
     columns = {"time_s": time} | {name: values[whole] for name, values in columns.items()}
+    # The torque of a joint without a drive is known to be zero.
+    columns |= {
+        joint.joint.column("torque"): np.zeros(len(time))
+        for joint in settings.joint
+        if joint.joint.is_passive
+    }
     _check_values(columns, settings)
     _check_periods(wanted, float(run.time_s[-1]))
     _note_period(columns, settings, wanted, note)
@@ -264,11 +270,18 @@ def _check_values(columns: Mapping[str, NDArray], settings: ImportMap) -> None:
     """Refuse an angle or torque that no joint has."""
     # N·m or N; far more than any drive delivers at a joint.
     largest_torque = 1e6
+    limited = plausibility.limited(settings)
     for i, joint in enumerate(settings.joint):
-        turns = joint.kind == "revolute"
-        angle = ("angle", LARGEST_ANGLE_RAD, "rad", "zero, counts_per_turn or wraps_at")
-        torque = ("torque", largest_torque, "N·m" if turns else "N", "scale or gains")
-        for quantity, most, unit, also in (angle, torque) if turns else (torque,):
+        unit = joint.joint.unit("torque")
+        angle = (
+            "angle",
+            LARGEST_ANGLE_RAD,
+            "rad",
+            "zero, counts_per_turn or wraps_at; or set turns = true for a joint that turns without"
+            " end",
+        )
+        torque = ("torque", largest_torque, unit, "scale or gains")
+        for quantity, most, unit, also in (angle, torque) if limited[i] else (torque,):
             values = columns[joint.joint.column(quantity)]
             beyond = np.flatnonzero(np.abs(values) > most)
             if len(beyond):
@@ -360,7 +373,7 @@ def _metadata(
         "geometry": settings.geometry.model_dump(exclude_none=True) or None,
     }
     return {
-        "joints": [{"name": joint.name, "kind": joint.kind} for joint in settings.joint],
+        "joints": [joint.joint.metadata for joint in settings.joint],
         "run": recording.run,
         "purpose": recording.purpose,
         "sample_rate_hz": sampling.rate_hz,

@@ -1,6 +1,6 @@
 """A machine: a mechanism whose joints have names and scales."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from importlib import import_module
 from itertools import combinations
@@ -65,9 +65,9 @@ class Machine:
         return tuple(joint.name for joint in self.joints)
 
     @property
-    def joint_metadata(self) -> list[dict[str, str]]:
+    def joint_metadata(self) -> list[dict[str, Any]]:
         """Its joints for a file's metadata."""
-        return [{"name": joint.name, "kind": joint.kind} for joint in self.joints]
+        return [joint.metadata for joint in self.joints]
 
     def joint(self, name: str) -> Joint:
         """Return the joint of a name."""
@@ -107,6 +107,14 @@ class Machine:
         return self.mechanism.places[self.names.index(name)]
 
     @property
+    def absorbs(self) -> Mapping[str, str]:
+        """Kinds of torque that the parameters absorb completely, as ``Mechanism.absorbs``."""
+        # The only drive fixes the scale of all parameters, so a gain of its torque does not show.
+        one_drive = sum(not joint.is_passive for joint in self.joints) == 1
+        gain = {"gain": "all parameters together"} if one_drive else {}
+        return {**self.mechanism.absorbs, **gain}
+
+    @property
     def is_exoskeleton(self) -> bool:
         """Whether it is the leg of the standard ranges and thresholds, by its joints' names."""
         return self.joints == HIP_AND_KNEE
@@ -134,8 +142,13 @@ def machine_of(
     Raises
     ------
     InputError
-        If no mechanism has such joints.
+        If no mechanism has such joints, or none of them a measured torque.
     """
+    if all(joint.is_passive for joint in joints):
+        raise InputError(
+            f"{source or 'the machine'}: no joint of {in_words(joints)} has a measured torque,"
+            " expected one at least, as it fixes the scale of inertia and friction"
+        )
     for mechanism in mechanisms_of(joints):
         if mechanism.has_gravity in (None, geometry.gravity_m_s2 != 0.0):
             return Machine(mechanism, tuple(joints), scales)

@@ -71,10 +71,15 @@ def refuse_another_mechanism(settings: MechanismSettings, runs: Sequence[Run]) -
         Names the first file with other kinds of joints.
     """
     for run in runs if settings.model_fields_set else ():
-        if run.machine.mechanism.kinds != settings.kinds:
+        declared = [(joint.kind, joint.drive) for joint in settings.all_joints]
+        recorded = [(joint.kind, joint.drive) for joint in run.machine.joints]
+        # Usual joints say nothing of drives: only joints that are listed do.
+        if run.machine.mechanism.kinds != settings.kinds or (
+            settings.joints and declared != recorded
+        ):
             raise InputError(
                 f"{run.file} has joints {in_words(run.machine.joints)}, expected those of"
-                f" exoid.toml's [mechanism]: {', '.join(settings.kinds)}; correct its name and"
+                f" exoid.toml's [mechanism]: {in_words(settings.all_joints)}; correct its name and"
                 " joints, or give no exoid.toml: each file names its own mechanism"
             )
 

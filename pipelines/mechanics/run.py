@@ -10,6 +10,7 @@ import numpy as np
 import pyarrow as pa
 
 from pipelines.contracts.joint_units import Scale
+from pipelines.contracts.joints import Joint
 from pipelines.contracts.table import Rows, Table
 from pipelines.contracts.windows import windows
 from pipelines.errors import InputError
@@ -168,8 +169,8 @@ def refuse_several_machines(runs: Sequence[Run]) -> None:
 
 def _named(run: Run) -> str:
     joints = run.machine.joints
-    alike = all(joint.kind == "revolute" for joint in joints)
-    return ", ".join(joint.name if alike else f"{joint.name} ({joint.kind})" for joint in joints)
+    alike = all(joint == Joint(joint.name) for joint in joints)
+    return ", ".join(joint.name if alike else str(joint) for joint in joints)
 
 
 def kinds_of(runs: Iterable[Run]) -> tuple[str, ...]:

@@ -56,6 +56,9 @@ def _scales(runs: Sequence[Run]) -> tuple[Scale, ...]:
     # Angles do not scale with the machine, because its equations contain their sines.
     slides = np.array([joint.kind == "prismatic" for joint in runs[0].machine.joints])
     travel = np.where(slides & (high > low), (high - low) / travel_rad, 1.0)
-    torque = np.where(torque > 0, torque / torque_nm, 1.0)
+    # A passive joint's torque is zero; its links are those that the weakest drive moves.
+    driven = torque[torque > 0]
+    torque = np.where(torque > 0, torque, driven.min() if len(driven) else torque_nm)
+    torque = torque / torque_nm
     speed = np.where(speed > 0, speed / speed_rad_s, 1.0)
     return tuple(Scale(*row) for row in np.column_stack([torque, speed, travel]).tolist())

@@ -25,9 +25,10 @@ def silent_torque(runs: Sequence[Run], joint: Joint, value: float) -> InputError
     InputError
         To be raised.
     """
+    passive = '; a joint without a drive has drive = "none"' if value == 0.0 else ""
     return InputError(
         f"{', '.join(run.file for run in runs)}: the"
         f" {'torque' if joint.kind == 'revolute' else 'force'} of {the(joint.name)} is {value:.4g}"
-        f" {joint.unit('torque')} in every row, expected one that varies; check that the drive was"
-        f" on, and which channel {settings_of(runs[0])} reads"
+        f" {joint.unit('torque')} in every row, expected one that varies. Check that the drive was"
+        f" on, and which channel {settings_of(runs[0])} reads{passive}"
     )

@@ -8,7 +8,7 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, field_validator, model_validator
 
-from pipelines.contracts.joint_units import Kind
+from pipelines.contracts.joint_units import Drive, Kind
 from pipelines.contracts.joints import Joint
 from pipelines.errors import SettingsError
 from pipelines.settings import transmission
@@ -246,13 +246,33 @@ class JointSettings(Settings):
         description="Its name; a leg's are hip and knee, in this order."
     )
     kind: Kind = Field("revolute", description="revolute turns, prismatic slides.")
+    drive: Drive = Field(
+        "measured",
+        description='"none" for a passive joint: its torque is zero, and has no column.',
+    )
+    turns: bool = Field(False, description="Whether it turns without end: its angle has no limit.")
     enabled: str | None = Field(None, description="Column that is 0 while the drive is off.")
     angle: JointReadingSettings = Field(description="Measured angle, or position of a slide.")
-    torque: JointReadingSettings = Field(description="Torque, or force, of the drive at the joint.")
+    torque: JointReadingSettings | None = Field(
+        None,
+        description="Torque, or force, of the drive at the joint; needed unless drive says so.",
+    )
     reference: JointReadingSettings | None = Field(None, description="Commanded angle or position.")
     velocity: JointReadingSettings | None = Field(None, description="The drive's own velocity.")
     current: JointReadingSettings | None = Field(None, description="Motor current.")
     temperature: JointReadingSettings | None = Field(None, description="Of the drive or its motor.")
+
+    @model_validator(mode="after")
+    def _torque_is_of_a_drive(self) -> Self:
+        if self.drive == "measured" and self.torque is None:
+            raise ValueError(
+                'torque: missing; add it, or set drive = "none" for a joint without a drive'
+            )
+        if self.drive == "none" and self.torque is not None:
+            raise ValueError('torque: found with drive = "none", expected none; remove one of them')
+        if self.turns and self.kind == "prismatic":
+            raise ValueError("turns: found at a prismatic joint, expected a revolute one")
+        return self
 
     @model_validator(mode="after")
     def _units_lead_to_the_joint(self) -> Self:
@@ -277,7 +297,7 @@ class JointSettings(Settings):
     @property
     def joint(self) -> Joint:
         """The joint, as in files."""
-        return Joint(self.name, self.kind)
+        return Joint(self.name, self.kind, self.drive, self.turns)
 
 
 class RecordingSettings(Settings):
@@ -362,6 +382,11 @@ class ImportMap(Settings):
 
     @model_validator(mode="after")
     def _fits_together(self) -> Self:
+        if all(joint.drive == "none" for joint in self.joint):
+            raise ValueError(
+                "joint: none has a drive, expected one at least, as its torque fixes the scale of"
+                " inertia; give one a torque"
+            )
         for name in repeated(joint.name for joint in self.joint):
             raise ValueError(f"joint: found {name} twice, expected each name once; rename one")
         for target in repeated(force.target for force in self.force):

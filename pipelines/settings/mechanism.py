@@ -4,7 +4,7 @@ from typing import Self
 
 from pydantic import Field, model_validator
 
-from pipelines.contracts.joint_units import Kind
+from pipelines.contracts.joint_units import Drive, Kind
 from pipelines.contracts.joints import HIP_AND_KNEE, Joint, in_words
 from pipelines.errors import SettingsError
 from pipelines.settings.base import Gravity, Length, Settings, repeated
@@ -19,6 +19,8 @@ class JointSettings(Settings):
 
     name: str = Field(pattern="^[a-z][a-z0-9_]*$", description="Columns of files begin with it.")
     kind: Kind = Field("revolute", description='"revolute" or "prismatic".')
+    drive: Drive = Field("measured", description='"none" for a passive joint.')
+    turns: bool = Field(False, description="Whether it turns without end.")
 
 
 class MechanismSettings(Settings):
@@ -73,9 +75,7 @@ class MechanismSettings(Settings):
     @property
     def all_joints(self) -> tuple[Joint, ...]:
         """The given joints, else the usual ones."""
-        return (
-            tuple(Joint(joint.name, joint.kind) for joint in self.joints) or USUAL_JOINTS[self.name]
-        )
+        return tuple(Joint(**dict(joint)) for joint in self.joints) or USUAL_JOINTS[self.name]
 
     @property
     def kinds(self) -> tuple[Kind, ...]:

@@ -64,12 +64,16 @@ def test_a_constant_angle_is_reported_as_constant(motions):
     assert (
         str(refused.value)
         == "run_0.parquet: the angle of the knee is -0.5 rad in every row, expected a joint that"
-        " moves; check its encoder, and which channel the map reads"
+        " moves; check its encoder, and which channel the map reads, or leave it out of the map if"
+        " it rests"
     )
 
 
-@pytest.mark.parametrize("value", [0.0, -3.2])
-def test_a_constant_torque_is_reported_as_constant(motions, value):
+@pytest.mark.parametrize(
+    ("value", "remedy"),
+    [(0.0, '; a joint without a drive has drive = "none"'), (-3.2, "")],
+)
+def test_a_constant_torque_is_reported_as_constant(motions, value, remedy):
     with pytest.raises(InputError) as refused:
         diagnose(
             [imported(replace(m, torque=m.torque * [1.0, 0.0] + [0.0, value])) for m in motions]
@@ -79,7 +83,7 @@ def test_a_constant_torque_is_reported_as_constant(motions, value):
         in str(refused.value)
     )
     assert str(refused.value).endswith(
-        "check that the drive was on, and which channel the map reads"
+        f"Check that the drive was on, and which channel the map reads{remedy}"
     )
 
 

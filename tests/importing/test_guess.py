@@ -843,7 +843,7 @@ def test_an_angle_that_no_joint_reaches_is_doubted_whatever_its_name_says(
     columns = swinging(pendulum)
     columns["angle_rad"] = np.degrees(columns.pop("angle"))
     _, doubts = guessed(write_csv(columns))
-    assert "are too many for a joint: check unit and gear_ratio" in doubts["joint[0].angle.unit"]
+    assert "turns, so check unit and gear_ratio" in doubts["joint[0].angle.unit"]
 
 
 def test_a_share_of_what_a_drive_can_asks_for_what_that_is(imported, guessed, pendulum, write_csv):

@@ -63,7 +63,7 @@ def law_rows(
         chosen = [i for i, law in enumerate(laws) if law.kind in kinds_in_cuffs]
         own = [replace(laws[i], wearer="cuffs") for i in chosen]
         parts.append((own, [x[:, :, chosen] for x in _both(zero, worn)]))
-    parts += [*_hums(prepared), *_coarse_steps(prepared, joints)]
+    parts += [*_hums(prepared), *_coarse_steps(prepared)]
     rows = [regression.project(regression.rows(columns)) for _, columns in parts]
     return [law for some, _ in parts for law in some], np.hstack(rows)
 
@@ -85,7 +85,7 @@ def _hums(prepared: PreparedRuns) -> Iterator[tuple[list[LawColumn], list[NDArra
 
 
 def _coarse_steps(
-    prepared: PreparedRuns, joints: int
+    prepared: PreparedRuns,
 ) -> Iterator[tuple[list[LawColumn], list[NDArray]]]:
     """Yield the law and the column of each joint whose torque may have coarse steps."""
     runs = prepared.runs
@@ -96,7 +96,10 @@ def _coarse_steps(
         for run, x in zip(runs, predicted, strict=True)
     ]
     usable = [run.motion.valid[:, np.newaxis] & away_from_reversals(run.motion) for run in runs]
-    for j in range(joints):
+    for j, joint in enumerate(prepared.baseline.machine.joints):
+        # No reading of a passive joint's torque can be rounded.
+        if joint.is_passive:
+            continue
         rms = float(prepared.torque[j])
         torque, residuals = (
             [x[u[:, j], j] for x, u in zip(one, usable, strict=True)]

@@ -121,7 +121,7 @@ def smooth_laws(run: Run, spans: Spans, load: NDArray) -> tuple[list[LawColumn],
             parts.append((j, column))
     # An elastic energy of both angles, as of a muscle or a band over two joints. It is a polynomial
     # in two angles, so other machines have no such law.
-    if joints == 2:
+    if joints == 2 and not any(joint.turns for joint in run.motion.machine.joints):
         for degree, pulls in _across_joints(_scaled_angle(run, spans), spans):
             laws.append(LawColumn("across_joints", None, "all", 1.0 / (1.0 + degree)))
             parts.append((slice(None), pulls))
@@ -136,10 +136,33 @@ def _scaled_angle(run: Run, spans: Spans) -> NDArray:
     return np.clip((run.state[0] - spans.middle) / spans.half_range, -1.5, 1.5)
 
 
-def _scaled_sum(run: Run, spans: Spans) -> NDArray:
-    """Return the sum of all angles (m,), scaled in the same way."""
+def _of_angle(run: Run, spans: Spans) -> list[NDArray]:
+    """Return functions of each joint's angle, (m, degrees)."""
+    scaled, joints = _scaled_angle(run, spans), run.motion.machine.joints
+    return [
+        _waves(run.state[0][:, j]) if joint.turns else _polynomials(scaled[:, j])
+        for j, joint in enumerate(joints)
+    ]
+
+
+def _of_sum(run: Run, spans: Spans) -> NDArray:
+    """Return such functions of the sum of all angles."""
     sums = run.state[0].sum(axis=1)
-    return np.clip((sums - spans.sum_middle) / spans.sum_half_range, -1.5, 1.5)
+    if any(joint.turns for joint in run.motion.machine.joints):
+        return _waves(sums)
+    return _polynomials(np.clip((sums - spans.sum_middle) / spans.sum_half_range, -1.5, 1.5))
+
+
+def _polynomials(x: NDArray, count: int = 10) -> NDArray:
+    """Return Legendre polynomials of a scaled angle, (m, count), by degree."""
+    return legvander(x, count - 1)
+
+
+def _waves(angle: NDArray, count: int = 10) -> NDArray:
+    """Return 1, sin q, cos q, sin 2q, cos 2q ... of an angle that repeats, (m, count)."""
+    phase = np.outer(angle, np.arange(1, count // 2 + 1))
+    waves = np.stack([np.sin(phase), np.cos(phase)], axis=2).reshape(len(angle), -1)
+    return np.column_stack([np.ones(len(angle)), waves])[:, :count]
 
 
 def _across_joints(x: NDArray, spans: Spans) -> Iterator[tuple[int, NDArray]]:
@@ -172,16 +195,16 @@ def _across_joints(x: NDArray, spans: Spans) -> Iterator[tuple[int, NDArray]]:
 
 def _laws_of(run: Run, spans: Spans, load: NDArray, j: int) -> Iterator[tuple[str, int, NDArray]]:
     """Yield kind, degree and column (m,) of each law at one joint."""
-    q = _scaled_angle(run, spans)
+    q = _of_angle(run, spans)
     v, a = run.state[1] / spans.speed, run.state[2] / spans.acceleration
     sign, tau = np.sign(run.state[1]), load / spans.torque
     here, way, force = v[:, j], sign[:, j], tau[:, j]
-    yield from _polynomials("angle", q[:, j], range(10))
+    yield from _scaled("angle", q[j], range(q[j].shape[1]))
     yield from _speed_laws(here, way)
     # Coulomb friction first, then viscous. Degree 0 of both is in the baseline.
-    yield from _scaled("friction_by_angle", q[:, j], range(1, 5), way)
-    yield from _scaled("friction_by_angle", q[:, j], range(1, 4), here)
-    yield from _scaled("inertia_by_angle", q[:, j], range(3), a[:, j])
+    yield from _scaled("friction_by_angle", q[j], range(1, 5), way)
+    yield from _scaled("friction_by_angle", q[j], range(1, 4), here)
+    yield from _scaled("inertia_by_angle", q[j], range(3), a[:, j])
     root = np.sqrt(np.abs(force))
     # The first two are friction that grows with the load. The others are a gain that depends on the
     # load's sign or size.
@@ -194,36 +217,33 @@ def _laws_of(run: Run, spans: Spans, load: NDArray, j: int) -> Iterator[tuple[st
     for k in range(1, 4):
         yield "friction_over_time", k, way * np.cos(k * phase)
         yield "friction_over_time", k, here * np.cos(k * phase)
-    if q.shape[1] > 1:
-        yield from _polynomials("both_angles", _scaled_sum(run, spans), range(1, 6))
-    for o in range(q.shape[1]):
+    if len(q) > 1:
+        yield from _scaled("both_angles", _of_sum(run, spans), range(1, 6))
+    for o in range(len(q)):
         if o == j:
             continue
-        yield from _polynomials("other_angle", q[:, o], range(1, 6))
-        yield "both_angles", 2, q[:, j] * q[:, o]
-        yield "both_angles", 3, q[:, j] ** 2 * q[:, o]
-        yield "both_angles", 3, q[:, j] * q[:, o] ** 2
+        yield from _scaled("other_angle", q[o], range(1, 6))
+        # The first function of an angle is the scaled angle itself, or its sine.
+        one, two = q[j][:, 1], q[o][:, 1]
+        yield "both_angles", 2, one * two
+        yield "both_angles", 3, one**2 * two
+        yield "both_angles", 3, one * two**2
         other, other_way = v[:, o], sign[:, o]
         for column in (other_way, other, np.abs(other), other * np.abs(other), here * other):
             yield "other_speed", 1, column
         yield "other_load", 1, tau[:, o]
         yield "other_load", 1, np.abs(tau[:, o]) * way
-        yield from _scaled("friction_by_other_angle", q[:, o], range(1, 4), way)
-        yield from _scaled("friction_by_other_angle", q[:, o], range(1, 3), here)
+        yield from _scaled("friction_by_other_angle", q[o], range(1, 4), way)
+        yield from _scaled("friction_by_other_angle", q[o], range(1, 3), here)
         yield "inertia_by_angle", 2, a[:, o]
 
 
-def _polynomials(kind: str, x: NDArray, degrees: range) -> Iterator[tuple[str, int, NDArray]]:
-    yield from _scaled(kind, x, degrees, np.ones_like(x))
-
-
 def _scaled(
-    kind: str, x: NDArray, degrees: range, factor: NDArray
+    kind: str, functions: NDArray, degrees: range, factor: NDArray | float = 1.0
 ) -> Iterator[tuple[str, int, NDArray]]:
-    """Yield Legendre polynomials of ``x`` times a factor."""
-    values = legvander(x, degrees[-1])
+    """Yield functions of an angle times a factor, one for each degree."""
     for degree in degrees:
-        yield kind, degree, values[:, degree] * factor
+        yield kind, degree, functions[:, degree] * factor
 
 
 def _speed_laws(v: NDArray, way: NDArray) -> Iterator[tuple[str, int, NDArray]]:

@@ -61,12 +61,18 @@ def find_faults(motions: Sequence[Motion], accept: Sequence[FaultKind] = ()) -> 
         # One wrong channel makes later checks fail as well, so only the first kind is reported.
         wrong = wrong or [*sign_faults(motion)]
         faults += wrong
-        run = averages(motion) if motion.machine.mechanism is LEG and not wrong else None
+        run = averages(motion) if _has_two_drives(motion) and not wrong else None
         legs += [] if run is None else [run]
     faults += _of_legs(legs)
     files = [motion.file for motion in motions]
     judged = [fault.judged(tuple(accept)) for fault in faults]
     return sorted(judged, key=lambda fault: files.index(fault.file))
+
+
+def _has_two_drives(motion: Motion) -> bool:
+    """Return whether a motion is of a leg whose joints both have a drive."""
+    machine = motion.machine
+    return machine.mechanism is LEG and not any(joint.is_passive for joint in machine.joints)
 
 
 def _of_legs(runs: Sequence[Averages]) -> list[Fault]:

@@ -60,7 +60,9 @@ def channel_faults(motion: Motion) -> Iterator[Fault]:
     yield from _copied(motion)
     for joint in range(motion.torque.shape[1]):
         yield from _stuck_angle(motion, joint)
-        yield from _torque(motion, joint)
+        # A passive joint's torque is zero throughout, and no channel.
+        if not motion.machine.joints[joint].is_passive:
+            yield from _torque(motion, joint)
     if motion.held_forces is not None and motion.run == "with_human":
         yield from _forces(motion, motion.held_forces)
 

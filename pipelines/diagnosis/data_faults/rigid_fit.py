@@ -76,9 +76,10 @@ class Averages:
     """(m, 2, 3) N, sums of front and back at thigh and shank; None where they were not read."""
 
     @property
-    def joints(self) -> range:
-        """Numbers of the joints."""
-        return range(self.torque.shape[1])
+    def joints(self) -> list[int]:
+        """Numbers of the joints that have a drive."""
+        joints = self.motion.machine.joints
+        return [j for j, joint in enumerate(joints) if not joint.is_passive]
 
     @property
     def is_leg(self) -> bool:
@@ -113,7 +114,7 @@ class Averages:
             Order and sign of a leg's channels; as recorded by default.
         """
         body, weight = self._body_of(joint, reading)
-        order, sign = reading if len(self.joints) > 1 else ((0,), (1.0,))
+        order, sign = reading if self.torque.shape[1] > 1 else ((0,), (1.0,))
         channel = order[joint]
         friction = sign[joint] * np.column_stack([self.direction[:, channel], self.dq[:, channel]])
         return Columns(np.hstack([body, friction]), np.hstack([weight, self.own_law(channel)]))

@@ -43,6 +43,12 @@ class Variable:
     """Inner knots of its curve; few where a fold leaves a gap as long as a knot's span."""
 
 
+def _angle(run: Run, j: int) -> NDArray:
+    """Return a joint's angle; within a turn if it turns without end."""
+    q = run.state[0][:, j]
+    return (q + np.pi) % (2.0 * np.pi) - np.pi if run.motion.machine.joints[j].turns else q
+
+
 def _of_other(run: Run, order: int, j: int) -> NDArray | None:
     """Return angle, speed or acceleration of the other of two joints."""
     return run.state[order][:, 1 - j] if len(run.motion.joints) == 2 else None
@@ -86,7 +92,7 @@ def _phase(run: Run, j: int) -> NDArray | None:
 
 
 VARIABLES = (
-    Variable("angle", "{joint}'s {place}", "rad", lambda run, j: run.state[0][:, j]),
+    Variable("angle", "{joint}'s {place}", "rad", _angle),
     # Friction jumps where the joint reverses.
     Variable(
         "speed", "{joint}'s speed", "rad/s", lambda run, j: run.state[1][:, j], by_direction=True

@@ -63,7 +63,7 @@ def planned_motions(
             joints=names,
             geometry=geometry,
             file=kind,
-            metadata={"joints": [{"name": j.name, "kind": j.kind} for j in trajectory.joints]},
+            metadata={"joints": [joint.metadata for joint in trajectory.joints]},
         )
         levels = zip(plant.coulomb_nm, plant.viscous_nm_s_rad, strict=True)
         for joint, own in zip(names, levels, strict=True):

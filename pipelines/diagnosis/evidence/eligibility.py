@@ -110,13 +110,14 @@ def _refuse_standstill(motions: Sequence[Motion]) -> None:
         _refuse_dead_angle(motions, j)
         lasts = _seconds(motions, [m[:, j] for m in moving])
         if lasts < least:
+            simpler = _simpler(motions[0]) if lasts == 0.0 else ""
             raise InputError(
                 f"{files}: {the(joint.name)} moves for {_rounded_down(lasts):.1f} s (faster than"
                 f" {reversal_speeds(machine)[j]:.2g} {joint.unit('velocity')} and away from"
                 f" reversals), expected {least:.2g} s {together}; excite"
                 f" {('it', 'both joints', 'all joints')[min(len(machine.joints), 3) - 1]}, or"
-                " record longer. If it did move, check its encoder, and the units of angle and"
-                f" time in {settings_of(motions[0])}"
+                f" record longer{simpler}. If it did move, check its encoder, and the units of"
+                f" angle and time in {settings_of(motions[0])}"
             )
         _refuse_dead_torque(motions, j)
     # Least time for which all joints of an exoskeleton move at once, s: errors are scored there.
@@ -138,10 +139,11 @@ def _rounded_down(seconds: float) -> float:
 
 def _refuse_dead_torque(motions: Sequence[Motion], joint: int) -> None:
     """Raise InputError for a torque that is constant while its joint moves."""
+    here = motions[0].machine.joints[joint]
     values = np.concatenate([m.torque[m.valid, joint] for m in motions])
-    if len(values) and np.ptp(values) == 0.0:
+    if len(values) and np.ptp(values) == 0.0 and not here.is_passive:
         # Adding zero turns a -0.0 into 0.0 in the message.
-        raise silent_torque(motions, motions[0].machine.joints[joint], float(values[0]) + 0.0)
+        raise silent_torque(motions, here, float(values[0]) + 0.0)
 
 
 def _refuse_dead_angle(motions: Sequence[Motion], joint: int) -> None:
@@ -154,7 +156,14 @@ def _refuse_dead_angle(motions: Sequence[Motion], joint: int) -> None:
             f"{', '.join(m.file for m in motions)}: the angle of {the(here.name)} is"
             f" {values[0]:.4g} {here.unit('angle')} in every row, expected a joint that moves;"
             f" check its encoder, and which channel {settings_of(motions[0])} reads"
+            f"{_simpler(motions[0])}"
         )
+
+
+def _simpler(motion: Motion) -> str:
+    """Return the way out for a blocked joint of several: the others are a simpler machine."""
+    several = len(motion.joints) > 1
+    return f", or leave it out of {settings_of(motion)} if it rests" if several else ""
 
 
 def _seconds(motions: Sequence[Motion], marked: Sequence[NDArray]) -> float:

@@ -125,7 +125,8 @@ def _correlation_time(series: Sequence[NDArray]) -> float:
     """Return the integrated autocorrelation time in samples, at least 1."""
     variance = np.nanmean(np.concatenate(series) ** 2)
     total = 1.0
-    for lag in range(1, 40):
+    # The torque of a passive joint is constant: it has no noise.
+    for lag in range(1, 40) if variance > 0.0 else ():
         products = np.concatenate([s[lag:] * s[:-lag] for s in series])
         rho = np.nanmean(products) / variance
         # Beyond the first small correlation the sum would collect errors of estimates.

@@ -79,7 +79,7 @@ def prepare(runs: Sequence[Run], baseline: Baseline) -> PreparedRuns:
     lines = lines_in(
         motions, [motion.torque - x for motion, x in zip(motions, predicted, strict=True)]
     )
-    torque = varying_torque(runs)
+    torque = varying_torque(runs, baseline, values)
     return PreparedRuns(
         loaded,
         baseline,

@@ -130,7 +130,7 @@ def _against(d: Diagnosis, labels: frozenset[str], probability: float) -> Iterat
 
 def _taken_up(effect: type[Effect], machine: Machine) -> dict[str, str]:
     """Return the joints at which other parameters absorb an effect whole, and which."""
-    everywhere = machine.mechanism.absorbs.get(effect.absorbed_as)
+    everywhere = machine.absorbs.get(effect.absorbed_as)
     by_joint = {
         joint: everywhere or effect.absorbed.get(machine.place(joint)) for joint in machine.names
     }

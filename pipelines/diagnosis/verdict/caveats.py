@@ -44,11 +44,13 @@ def caveats(d: Diagnosis) -> list[str]:
 
 def floor_that_hides(d: Diagnosis) -> dict[str, float]:
     """Return joints whose noise floor is high, with its share of their torque."""
-    shares = zip(d.baseline.joints, (d.floor_rms / d.torque_rms).tolist(), strict=True)
+    parts = zip(d.baseline.machine.joints, d.floor_rms, d.torque_rms, strict=True)
+    # A passive joint's torque is zero.
+    shares = {joint.name: float(f / t) for joint, f, t in parts if not joint.is_passive}
     # Share of a joint's torque above which a noise floor is doubtful: no sensor is as noisy, and
     # friction is seldom more.
     hiding = 0.2
-    return {joint: share for joint, share in shares if share > hiding}
+    return {joint: share for joint, share in shares.items() if share > hiding}
 
 
 def _high_floor(d: Diagnosis) -> list[str]:

@@ -131,6 +131,9 @@ class _JointWriter:
         self.proposal.key("name", self.joint.name)
         why = "its unit is a length" if self.slides else self._if_it_slides()
         self.proposal.key("kind", self.kind, why, self.units.why == FROM_NAME)
+        if self.too_far:
+            why = f"{self.turns:.4g} turns; remove it if another unit or gear_ratio is right"
+            self.proposal.key("turns", True, why, sure=False)
         if self.joint.enabled:
             self.used.append(self.joint.enabled)
             self.proposal.key("enabled", self.joint.enabled, _when_off(columns[self.joint.enabled]))
@@ -143,7 +146,7 @@ class _JointWriter:
             why += "; jumps from row to row, as no motion does: outliers, or an unknown encoding"
             sure = False
         if self.too_far:
-            why += f"; {self.turns:.4g} turns are too many for a joint: check unit and gear_ratio"
+            why += f"; {self.turns:.4g} turns, so check unit and gear_ratio"
             sure = False
         self.proposal.key("unit", self.units.angle, why, sure)
         if self.units.angle == "counts":

@@ -10,6 +10,7 @@ from pipelines.importing.quantities.expression import Expression
 from pipelines.importing.quantities.numbers import TAKEN_FOR_MISSING, numbers
 from pipelines.importing.quantities.wraparound import (
     full_at,
+    sawtooth,
     sign_bit,
     signed,
     unwrapped,
@@ -32,6 +33,8 @@ def quantity(
     columns: Mapping[str, NDArray],
     where: str,
     note: Note,
+    *,
+    turns: bool = False,
 ) -> NDArray:
     """Return a reading as a quantity: sign x gain x unit(scale x raw - zero).
 
@@ -47,6 +50,8 @@ def quantity(
         Name of the quantity in errors.
     note : callable
         Takes what is reported about the reading.
+    turns : bool, optional
+        Whether it is the angle of a joint that turns without end, and is unwrapped in any case.
 
     Returns
     -------
@@ -67,17 +72,19 @@ def quantity(
         raw = _within(raw, reading.range, note)
     # An infinite value, as of an expression that divides by zero, is as little known as none.
     raw = np.where(np.isinf(raw), np.nan, raw)
-    if reading.wraps_at is not None:
-        # The joint's zero as a raw reading: most joints begin less than half a turn from it.
-        near = reading.zero / reading.scale if reading.begins_at is None else reading.begins_at
-        raw = unwrapped(raw, reading.wraps_at, note, near)
-    unit = reading.known_unit
-    if reading.wraps_at is None:
-        # Only reported: a step by a turn may be meant, as in a set-point.
+    unit, wraps_at = reading.known_unit, reading.wraps_at
+    if wraps_at is None:
         full = full_at(raw, _turns(reading, unit))
-        if full is not None:
+        if turns:
+            wraps_at = full or sawtooth(raw, _turns(reading, unit))
+        # Only reported: a step by a turn may be meant, as in a set-point.
+        elif full is not None:
             seen = f"steps by {full:.6g} from one row to the next, as a full counter does"
             note(seen, f"kept; set wraps_at = {full:.10g} at it")
+    if wraps_at is not None:
+        # The joint's zero as a raw reading: most joints begin less than half a turn from it.
+        near = reading.zero / reading.scale if reading.begins_at is None else reading.begins_at
+        raw = unwrapped(raw, wraps_at, note, near)
     return reading.sign * gain * (unit.factor * (reading.scale * raw - reading.zero) + unit.offset)
 
 

@@ -200,3 +200,22 @@ def full_at(values: NDArray, turns: Iterable[float]) -> float | None:
         ):
             return modulus
     return None
+
+
+def sawtooth(values: NDArray, turns: Iterable[float]) -> float | None:
+    """Return the turn within which the readings of a fast shaft stay; None where they leave it.
+
+    It needs no slow rows between two wraparounds, as ``full_at`` does.
+
+    Parameters
+    ----------
+    values : (n,) array
+        Readings, NaN where missing.
+    turns : iterable of float
+        Readings of a turn.
+    """
+    known = values[np.isfinite(values)]
+    reach = float(np.ptp(known)) if len(known) else 0.0
+    largest = float(np.max(np.abs(np.diff(known)), initial=0.0))
+    # The tolerance is for rounded readings, such as 360.0 for 359.98.
+    return next((turn for turn in turns if reach <= 1.001 * turn and largest > 0.5 * turn), None)

@@ -5,17 +5,41 @@ from collections.abc import Iterator, Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from pipelines.contracts.checks import LARGEST_ANGLE_RAD
 from pipelines.contracts.joints import in_words
+from pipelines.errors import InputError
 from pipelines.importing.finding import Finding, counted
 from pipelines.importing.quantities.consistency import MOST, SPAN, integral_agreement, whole_rows
 from pipelines.importing.quantities.wraparound import fill_value
-from pipelines.mechanics.machine import known_in_words, mechanisms_of
+from pipelines.mechanics.geometry import Geometry
+from pipelines.mechanics.machine import known_in_words, machine_of, mechanisms_of
 from pipelines.settings.import_map import ImportMap, JointSettings
 
 STRONGEST = {"torque": 1e3, "force": 1e5}
 """N·m and N; drives of legs, arms and robots deliver less, so more is mostly in another unit."""
 SHORTEST = {"revolute": (1e-3, "rad"), "prismatic": (1e-5, "m")}
 """Least motion of a joint from which inertia can be seen, about the play of a gear or screw."""
+
+
+def limited(settings: ImportMap) -> list[bool]:
+    """Return for each joint whether its angle has a limit.
+
+    A slide has no angle. A revolute joint may turn on if the map says so, or if no torque depends
+    on its angle, as about a vertical axis.
+    """
+    geometry = Geometry(**settings.geometry.model_dump(exclude_none=True))
+    joints = [joint.joint for joint in settings.joint]
+    try:
+        machine = machine_of(joints, geometry)
+    except InputError:
+        # A machine that exoid does not know may have gravity at every joint.
+        bends = [True] * len(joints)
+    else:
+        bends = [machine.place(joint.name) in machine.mechanism.bends_at for joint in joints]
+    return [
+        joint.kind == "revolute" and not joint.turns and depends
+        for joint, depends in zip(joints, bends, strict=True)
+    ]
 
 
 def check(columns: Mapping[str, NDArray], settings: ImportMap) -> Iterator[Finding]:
@@ -37,6 +61,7 @@ def check(columns: Mapping[str, NDArray], settings: ImportMap) -> Iterator[Findi
         yield from _still(columns, joint)
         yield from _velocity(columns, joint)
         yield from _too_short(columns, joint)
+        yield from _turns_on(columns, joint)
         yield from _slips(columns, joint)
         yield from _too_strong(columns, joint)
     yield from _power(columns, settings.joint)
@@ -58,12 +83,18 @@ def check(columns: Mapping[str, NDArray], settings: ImportMap) -> Iterator[Findi
 
 
 def _still(columns: Mapping[str, NDArray], joint: JointSettings) -> Iterator[Finding]:
-    for quantity in ("angle", "torque"):
+    for quantity in ("angle", *_torque_of(joint)):
         name = joint.joint.column(quantity)
         if np.ptp(columns[name]) == 0.0:
-            yield Finding(
-                name, f"is {columns[name][0]:.6g} in every row", "it carries no information"
-            )
+            action = "it carries no information"
+            if quantity == "torque" and not columns[name].any():
+                action += '; set drive = "none" in place of the table if the joint has no drive'
+            yield Finding(name, f"is {columns[name][0]:.6g} in every row", action)
+
+
+def _torque_of(joint: JointSettings) -> tuple[str, ...]:
+    """Return the quantity torque, if the log has it."""
+    return () if joint.joint.is_passive else ("torque",)
 
 
 def _too_short(columns: Mapping[str, NDArray], joint: JointSettings) -> Iterator[Finding]:
@@ -76,11 +107,22 @@ def _too_short(columns: Mapping[str, NDArray], joint: JointSettings) -> Iterator
         yield Finding(name, seen, "kept; check its unit, scale and gear_ratio")
 
 
+def _turns_on(columns: Mapping[str, NDArray], joint: JointSettings) -> Iterator[Finding]:
+    """Report a joint that turns further than joints do, although the map does not say so."""
+    name = joint.joint.column("angle")
+    reach = float(np.max(np.abs(columns[name])))
+    if joint.kind == "revolute" and not joint.turns and reach > LARGEST_ANGLE_RAD:
+        seen = f"moves over {np.ptp(columns[name]) / (2.0 * np.pi):.3g} turns"
+        yield Finding(
+            name, seen, "kept, as no torque depends on it; set turns = true, or correct its unit"
+        )
+
+
 def _slips(columns: Mapping[str, NDArray], joint: JointSettings) -> Iterator[Finding]:
     """Report single readings far from nearly all others."""
     # Distance from the median, relative to that of 99 % of the rows, that marks an outlier.
     far_off = 20.0
-    for quantity in ("angle", "torque"):
+    for quantity in ("angle", *_torque_of(joint)):
         name = joint.joint.column(quantity)
         filler = fill_value(columns[name])
         if filler is not None:
