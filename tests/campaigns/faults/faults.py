@@ -260,7 +260,7 @@ def cases(frames: type[Frame]) -> list[Case]:
         Case(
             "every reply has another transaction id",
             From(other_transaction, times=ALWAYS),
-            "did not answer",
+            "answered with transaction",
             frames=TcpFrame,
         ),
         Case(
