@@ -74,12 +74,13 @@ def scatter(run: Run, residual: NDArray) -> NDArray:
         N·m; NaN where a sample is not usable.
     """
     # With less than two periods, some phases of the motion would have no difference.
-    motion = run.motion
-    period, step_s = motion.period_s, 1.0 / motion.sample_rate_hz
-    lasts = float(motion.time[-1] - motion.time[0])
-    if not period or not len(run.time) or whole_periods(lasts, step_s, period) < 2:
+    period, width = run.motion.period_s, run.block.decimation / run.motion.sample_rate_hz
+    if (
+        not period
+        or not len(run.time)
+        or whole_periods(float(run.time[-1] - run.time[0]), width, period) < 2
+    ):
         return np.zeros((0, residual.shape[1]))
-    width = run.block.decimation / run.motion.sample_rate_hz
     shift = period / width
     # Blocks are compared as they are where the period is a whole number of them.
     whole = round(shift)

@@ -55,7 +55,7 @@ def are_held(values: NDArray) -> bool:
 
 
 def remarks(run: Run, columns: Mapping[str, NDArray]) -> list[Finding]:
-    """Report the columns of a run that hold their values, with the rate of the new ones."""
+    """Report the columns (n,) of a run that hold their values, with the rate of the new ones."""
     rows_hz, found = sample_rate(run.time_s), []
     for name, values in columns.items():
         if are_held(values):
