@@ -134,13 +134,13 @@ def _others_suffice(run: Motion, motions: Sequence[Motion], hopeless: Container[
 
 def excluding(motions: Sequence[Motion], faults: Iterable[Fault]) -> list[Motion]:
     """Return the motions with the faults' samples invalid, and without cuffs that are left out."""
-    found = list(faults)
+    faults = list(faults)
     bad: dict[str, NDArray] = {}
-    for fault in found:
+    for fault in faults:
         if fault.samples is not None:
             before = bad.get(fault.file)
             bad[fault.file] = fault.samples if before is None else before | fault.samples
     valid = [replace(m, valid=m.valid & ~bad[m.file]) if m.file in bad else m for m in motions]
     # A cuff that is silent would testify that the wearer weighs nothing.
-    silent = {fault.file for fault in found if fault.without_cuffs}
+    silent = {fault.file for fault in faults if fault.without_cuffs}
     return [replace(m, forces=None) if m.file in silent else m for m in valid]

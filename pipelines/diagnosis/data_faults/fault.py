@@ -57,12 +57,12 @@ class Fault:
         """The fault, its remedy, its proof, and how to overrule it."""
         if self.proof is None:
             return self.what
-        told = f"{self.what}. {self.proof.in_words}"
+        sentences = f"{self.what}. {self.proof.in_words}"
         if self.accepted:
-            return f'{told}; accepted by [diagnose] accept = ["{self.kind}"]'
+            return f'{sentences}; accepted by [diagnose] accept = ["{self.kind}"]'
         if self.is_veto:
-            return f'{told}; if it is right as it is, set [diagnose] accept = ["{self.kind}"]'
-        return f"{told}: too little to stop at"
+            return f'{sentences}; if it is right as it is, set [diagnose] accept = ["{self.kind}"]'
+        return f"{sentences}: too little to stop at"
 
     def judged(self, accept: tuple[FaultKind, ...]) -> "Fault":
         """Return the fault, accepted where the user overrules a veto of its kind."""

@@ -48,7 +48,13 @@ class Columns:
     """(m, f)."""
 
     def at(self, rows: NDArray) -> "Columns":
-        """Return the columns at some blocks, an index or mask of the m."""
+        """Return the columns at some blocks.
+
+        Parameters
+        ----------
+        rows : (m,) bool array
+            Which blocks.
+        """
         return Columns(self.positive[rows], self.free[rows])
 
     def split(self, values: NDArray) -> tuple[NDArray, "Columns"]:
