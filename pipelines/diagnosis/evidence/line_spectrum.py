@@ -149,9 +149,10 @@ def spectrum_over_angle(channels: Sequence[Channel], searched: Orders) -> Spectr
     least_informed = 1e-3
     information = np.maximum(information, least_informed * np.max(information))
     ratio = power / np.interp(orders, some, information)
-    # Line widths over which the median of the local level is taken over the angle. Over many turns
-    # a line is narrow, and what surrounds it within a cycle is its own.
-    around = round(20 * max(1.0, 1.0 / searched.width))
+    # Line widths over which the median of the local level is taken over the angle.
+    around = 20
+    # Over many turns a line is narrow, and what surrounds it within a cycle is its own.
+    around = round(around * max(1.0, 1.0 / searched.width))
     level = _level(ratio, oversampled * around, 1)
     return Spectrum(Kind.ANGLE, orders, ratio / level, level, searched.width, 1, around)
 
