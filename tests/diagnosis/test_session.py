@@ -214,14 +214,16 @@ def test_a_run_thinned_out_on_purpose_has_no_gaps(motions):
     assert find_faults([replace(motions[0], **thin, temperature=None, sample_rate_hz=100.0)]) == []
 
 
-def test_where_a_fault_leaves_nothing_of_the_only_run_the_message_names_it(motions):
+def test_where_a_fault_leaves_nothing_of_the_only_run_nothing_judges_it_and_the_run_is_refused(
+    motions,
+):
     torque = motions[0].torque.copy()
     torque[:, 1] = 3.0
     stuck = replace(motions[0], torque=torque)
     (fault,) = find_faults([stuck])
     # No sample can judge it.
     assert "stuck" in fault.what and fault.proof is None
-    with pytest.raises(InputError, match="torque is stuck"):
+    with pytest.raises(InputError, match="in every row"):
         training_data([stuck])
 
 
