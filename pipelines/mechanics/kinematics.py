@@ -273,7 +273,8 @@ class _Grid:
         # a low-pass averages out. Between nearly even samples a spline is more accurate.
         self._between: Callable[[NDArray, NDArray], Any] = CubicSpline
         if stretches.uneven:
-            self._between = partial(Akima1DInterpolator, method="makima")
+            # The grid ends at a sample, but for rounding.
+            self._between = partial(Akima1DInterpolator, method="makima", extrapolate=True)
         self._rate_hz = rate_hz
 
     def filtered(

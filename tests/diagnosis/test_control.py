@@ -7,7 +7,9 @@ import numpy as np
 import pytest
 
 from pipelines.contracts import HIP_AND_KNEE
+from pipelines.contracts.fault_kind import FaultKind
 from pipelines.diagnosis.data_faults import Fault
+from pipelines.diagnosis.data_faults.proof import Proof
 from pipelines.diagnosis.verdict.control_benefit import control
 from pipelines.dynamics.plant import make_plant
 from pipelines.dynamics.tracking import track
@@ -81,7 +83,8 @@ def test_where_no_cause_is_named_there_is_nothing_to_compare(sprung):
 
 
 def test_no_loop_is_simulated_of_faulty_recordings(sprung):
-    stuck = Fault("run_0.parquet", "hip_torque_nm", "stuck", None)
+    proof = Proof(recorded=0.5, mended=0.01, agreement=0.99)
+    stuck = Fault(FaultKind.STUCK, "run_0.parquet", "hip_torque_nm", "stuck", proof=proof)
     loop = control(replace(sprung, data=replace(sprung.data, faults=(stuck,))))
     assert loop["without"] is loop["with"] is None
     assert loop["reason"].startswith("acquisition is at fault")

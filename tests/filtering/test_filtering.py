@@ -85,6 +85,17 @@ def test_a_jittering_clock_is_taken_at_its_own_times():
     )
 
 
+@pytest.mark.parametrize("lasts_s", [19.9, 20.1, 20.3, 20.7])
+def test_an_uneven_run_is_known_to_its_last_sample(lasts_s):
+    rng = np.random.default_rng(3)
+    time = np.linspace(0.0, lasts_s, 2000)
+    time[1:-1] += rng.uniform(-4e-3, 4e-3, 1998)
+    run = recording(time, 1e-6)
+    run.metadata["sample_rate_hz"] = 1999 / lasts_s
+    frame = filter_recording(run, FilterSettings(cutoff_hz=12.0)).motion.frame
+    assert np.isfinite(frame["hip_velocity_rad_s"]).all()
+
+
 def test_a_stretch_too_short_to_filter_is_kept_but_not_trusted():
     time = grid(20)
     kept = np.r_[time[:3000], time[3100:3103], time[3200:]]

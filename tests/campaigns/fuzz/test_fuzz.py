@@ -67,8 +67,8 @@ def test_the_right_reply_is_taken(answered):
         ({"body": b"\x83\x02\x00"}, "with 3 bytes that do not fit function 131"),
         ({"body": b"\x03\x1a" + bytes(26)}, "with 13 registers, expected 14"),
         ({"body": b"\x83\xc8"}, "with Modbus exception 200; "),
-        ({"unit": 2}, "did not answer"),
-        ({"protocol": 1}, "did not answer"),
+        ({"unit": 2}, "answered under unit 2"),
+        ({"protocol": 1}, "that are no frame"),
     ],
 )
 def test_a_reply_that_is_none_is_refused_by_what_is_wrong_with_it(answered, change, message):
