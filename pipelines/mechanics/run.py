@@ -21,6 +21,9 @@ from pipelines.mechanics.motion import Motion, Piece, motion_from_table
 
 RUNS = ("exo_alone", "with_human")
 
+WINDOW = 2**16
+"""Samples in a piece."""
+
 
 @dataclass(frozen=True)
 class StoredRun:
@@ -102,7 +105,7 @@ class StoredRun:
         Yields
         ------
         Piece
-            Of at most 65,536 rows and the margins.
+            Of at most ``WINDOW`` rows and the margins.
         """
         if self._even is not None:
             yield from self._even.pieces(margin)
@@ -110,7 +113,7 @@ class StoredRun:
         # First row of the segment in which the next window begins. A filter over blocks counts them
         # from there, so that windows do not shift the blocks.
         begun = 0
-        for window in windows(self.rows.pieces(self._columns), 2**16, margin):
+        for window in windows(self.rows.pieces(self._columns), WINDOW, margin):
             motion = self._motion(window.rows)
             # np.diff is not zero at a segment's last row, and the next segment begins a row later.
             changes = window.first + 1 + np.flatnonzero(np.diff(motion.segment))
