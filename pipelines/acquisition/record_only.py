@@ -17,7 +17,7 @@ import numpy as np
 from pipelines.acquisition.machine.read_only import ReadOnlyMachine, ReadOnlyRow
 from pipelines.acquisition.modbus.exclusive_access import exclusive_access
 from pipelines.acquisition.modbus.file_lock import locked
-from pipelines.acquisition.pacing import PhaseLock
+from pipelines.acquisition.pacing import LEAN
 from pipelines.acquisition.recording.journal import Journal
 from pipelines.acquisition.recording.journal_file import refuse_leftover
 from pipelines.acquisition.run_outcome import Outcome, record_journal
@@ -156,7 +156,7 @@ class _Recorder:
 
     async def record(self, path: Path, metadata: dict[str, Any], claim: Callable[[], None]) -> None:
         """Connect, then write every row to the journal, which ends with the reason of a stop."""
-        machine = ReadOnlyMachine(self._rig)
+        machine = ReadOnlyMachine(self._rig, self._rate_hz)
         try:
             await until_signal(machine.connect(), self._stopped_by)
             with Journal(path, ["time_s", *machine.columns, "sequence"], metadata) as journal:
@@ -170,30 +170,31 @@ class _Recorder:
             machine.close()
 
     async def _follow(self, machine: ReadOnlyMachine, journal: Journal) -> None:
-        """Read rows until the last one is written."""
-        pace = (
-            _CounterPace(machine, self._rate_hz, self._watchdog_s)
-            if machine.has_counter
-            else _HostPace(self._rate_hz)
-        )
+        """Read rows until the last one is written; one that cannot be read is left out."""
+        pace = (_CounterPace if machine.has_counter else _HostPace)(self._rate_hz)
         answered_at = reported_at = time.monotonic()
-        number = -1
+        number, fault = -1, None
         while number < self._planned - 1:
             await pace.wait()
             if self._stopped_by:
                 raise DeviceError(f"stopped by {self._stopped_by[0]}")
-            row, now = await machine.row(), time.monotonic()
-            placed = pace.place(row) if row else None
-            if placed and placed[0] > number:
-                assert row
-                number, answered_at = placed[0], now
-                if number < self._planned:
-                    self._widths.append(row.answered - row.asked)
-                    journal.append([placed[1], *row.values, number])
+            try:
+                row = await machine.row()
+            except DeviceError as error:  # nothing moves, so a fault costs rows only
+                fault = error
+            else:
+                at, seconds = pace.place(row)
+                if at > number:
+                    number, answered_at, fault = at, time.monotonic(), None
+                    if number < self._planned:
+                        self._widths.append(row.answered - row.asked)
+                        journal.append([seconds, *row.values, number])
+            now = time.monotonic()
             if now - answered_at > self._watchdog_s:
+                why = fault or "the machine's counter stands still; check the machine"
                 raise DeviceError(
                     f"no new sample of all devices for {self._watchdog_s:g} s"
-                    " (safety.watchdog_s); check the machine and its lines"
+                    f" (safety.watchdog_s): {why}"
                 )
             if now - reported_at >= 1.0:
                 reported_at = now
@@ -240,23 +241,30 @@ class _HostPace:
 
 
 class _CounterPace:
-    """Rows by the first device's counter."""
+    """Rows by the first device's counter: each is read soon after the device's new sample.
 
-    def __init__(self, machine: ReadOnlyMachine, rate_hz: float, watchdog_s: float) -> None:
-        self._machine = machine
-        self._pace = PhaseLock(rate_hz, machine.count, watchdog_s)
-        self._last: int | None = None
+    Requests lean a little towards the instant of the sample. One that comes too early finds the
+    sample before, and is repeated a little later.
+    """
+
+    def __init__(self, rate_hz: float) -> None:
+        self._period = 1.0 / rate_hz
+        self._due = time.perf_counter()
         self._first: tuple[int, float] | None = None
+        self._last: int | None = None
 
     async def wait(self) -> None:
-        """Wait until the device has a new sample."""
-        if self._last is None:
-            self._last = await self._machine.count()
-        await self._pace.wait(self._last)
+        """Wait until the device should have a new sample."""
+        await asyncio.sleep(max(0.0, self._due - time.perf_counter()))
+        self._due = time.perf_counter() + (1.0 - LEAN) * self._period
 
     def place(self, row: ReadOnlyRow) -> tuple[int, float]:
         """Return the number and the time (s) of a row."""
+        # Share of a period to wait after a row that was read too early.
+        step_back = 0.1
         assert row.sequence is not None  # the device has a counter
+        if row.sequence == self._last:
+            self._due = row.answered + step_back * self._period
         self._last = row.sequence
         seconds = row.time if row.time is not None else 0.5 * (row.asked + row.answered)
         self._first = self._first or (row.sequence, seconds)

@@ -1,10 +1,17 @@
 """A machine that its own controller moves is recorded, and nothing is ever written to it."""
 
+import contextlib
+import itertools
 import json
+import socket
+import struct
+import threading
+import time
 
 import numpy as np
 import pytest
 
+from pipelines.acquisition.check.check import check_rig
 from pipelines.acquisition.record_only import record_only
 from pipelines.contracts import RECORDING
 from pipelines.errors import DeviceError, SettingsError
@@ -101,6 +108,133 @@ def test_a_machine_that_falls_silent_leaves_an_aborted_recording(record_only_on,
     aborted = RECORDING.read(tmp_path / "only.aborted.parquet")
     assert aborted.metadata["abort"]
     assert len(aborted.frame) > 5
+
+
+def a_device(answer, most_answers=10**9):
+    """Serve counter (100 a second), angle and torque; `answer(n, words)` may give other words.
+
+    It gives an exception code instead, or None for no answer. A connection ends after
+    `most_answers`. Returns the server's socket, and the set of functions that were asked for.
+    """
+    asked, began = set(), time.monotonic()
+    numbers = itertools.count()
+
+    def serve(link):
+        with link, contextlib.suppress(OSError):
+            for _ in range(most_answers):
+                head = link.recv(7, socket.MSG_WAITALL)
+                if len(head) < 7:
+                    return
+                content = link.recv(int.from_bytes(head[4:6], "big") - 1, socket.MSG_WAITALL)
+                asked.add(content[0])
+                first, count = struct.unpack(">HH", content[1:5])
+                now = round(100.0 * (time.monotonic() - began))
+                words = answer(next(numbers), [now, 500, 20])
+                if words is None:
+                    continue
+                reply = (
+                    bytes([content[0] | 0x80, words])
+                    if isinstance(words, int)
+                    else struct.pack(
+                        f">BB{count}H", content[0], 2 * count, *words[first : first + count]
+                    )
+                )
+                link.sendall(head[:4] + struct.pack(">HB", len(reply) + 1, head[6]) + reply)
+
+    def accept():
+        with contextlib.suppress(OSError):
+            while True:
+                threading.Thread(target=serve, args=(server.accept()[0],), daemon=True).start()
+
+    server = socket.create_server(("127.0.0.1", 0))
+    threading.Thread(target=accept, daemon=True).start()
+    return server, asked
+
+
+BENCH = """\
+name = "bench"
+recording_only = true
+[[drive]]
+joint = "elbow"
+port = {port}
+map = "plc"
+[map.drive.plc.read]
+sequence = {{ address = 0, type = "uint16" }}
+angle = {{ address = 1, type = "int16", scale = 1e-3, unit = "rad" }}
+torque = {{ address = 2, type = "int16", scale = 0.1, unit = "N·m" }}
+[safety]
+watchdog_s = {watchdog_s}
+connect_s = 0.5
+"""
+ELBOW = MechanismSettings.model_validate({"joints": [{"name": "elbow", "kind": "revolute"}]})
+
+
+@pytest.fixture
+def record_bench(tmp_path):
+    """Record a device for 0.8 s; return the rows. Nothing may be written to it."""
+
+    def run(answer, most_answers=10**9, rate_hz=100.0, watchdog_s=0.6):
+        server, asked = a_device(answer, most_answers)
+        path, output = tmp_path / "bench.toml", tmp_path / "bench.parquet"
+        path.write_text(BENCH.format(port=server.getsockname()[1], watchdog_s=watchdog_s))
+        settings = RunSettings(name="one", run="exo_alone", purpose="train", duration_s=0.8)
+        with server:
+            record_only(path, settings, output, rate_hz, ELBOW)
+        assert asked == {3}
+        return RECORDING.read(output).frame
+
+    return run
+
+
+def busy_now_and_then(n, words):
+    return 6 if n % 7 == 6 else words
+
+
+def leaps_now_and_then(n, words):
+    return [words[0] + 3000, 900, 20] if n % 7 == 6 else words
+
+
+def slow(n, words):
+    time.sleep(0.025)
+    return words
+
+
+@pytest.mark.parametrize(
+    ("answer", "most_answers"),
+    [(busy_now_and_then, 10**9), (leaps_now_and_then, 10**9), (slow, 10**9), (slow, 5)],
+    ids=["busy", "another device's answer", "slower than its samples", "five answers a connection"],
+)
+def test_a_fault_of_one_answer_costs_one_row_and_never_a_wrong_one(
+    record_bench, answer, most_answers
+):
+    frame = record_bench(answer, most_answers)
+    assert len(frame) >= 12, "even where an answer takes 25 ms"
+    assert (frame["elbow_angle_rad"] == 0.5).all()
+    assert frame["sequence"].iloc[-1] <= 80
+    assert np.allclose(frame["time_s"], frame["sequence"] / 100.0, atol=0.1)
+
+
+def test_a_recording_that_ends_early_names_the_fault_that_ended_it(record_bench):
+    with pytest.raises(DeviceError, match=r"0\.3 s \(safety\.watchdog_s\): .*it is busy"):
+        record_bench(lambda n, words: 6 if n > 30 else words, watchdog_s=0.3)
+
+
+def test_a_counter_of_another_rate_is_refused_rather_than_recorded(record_bench):
+    with pytest.raises(DeviceError, match=r"expected 25 a second; correct acquire\.sample_rate_hz"):
+        record_bench(lambda n, words: words, rate_hz=25.0)
+
+
+def test_the_check_counts_answers_that_fail_and_changes_no_unit_for_them(tmp_path):
+    server, asked = a_device(busy_now_and_then, 5)
+    path = tmp_path / "bench.toml"
+    path.write_text(BENCH.format(port=server.getsockname()[1], watchdog_s=1.0))
+    with server:
+        report = check_rig(path, 100.0)
+    assert asked == {3}
+    assert not report.findings
+    notes = "\n".join(report.notes)
+    assert "readings failed; the first answered" in notes
+    assert "it was opened again each time" in notes
 
 
 @pytest.mark.parametrize(

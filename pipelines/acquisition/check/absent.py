@@ -37,6 +37,8 @@ async def explain_absence(probe: Probe, probes: Sequence[Probe]) -> Finding | No
                 f'{line.label}: answers in other frames; set transport = "{transport}" of its'
                 " [line]",
             )
+    elif await _is(probe, unit):  # it is there: one answer was lost
+        return None
     other = await _other_unit(probe, probes)
     if other is None:
         return None

@@ -7,6 +7,7 @@ from pymodbus.pdu.register_message import ReadWriteMultipleRegistersRequest
 
 from pipelines.acquisition.check.probe import Probe
 from pipelines.acquisition.machine.drive import Drive
+from pipelines.acquisition.modbus.device import FOR_NOW
 from pipelines.acquisition.modbus.reply import READ_HOLDING, READ_INPUT, READ_WRITE
 from pipelines.errors import DeviceError, Refused
 from pipelines.settings.rig import Register
@@ -75,7 +76,9 @@ async def _answers(probe: Probe, addresses: range, function: int | None = None) 
         await probe.part.device.read(
             addresses.start, len(addresses), function=function or probe.part.reader.function
         )
-    except Refused:
+    except Refused as error:
+        if error.code in FOR_NOW:  # shows nothing about the registers
+            raise
         return False
     return True
 

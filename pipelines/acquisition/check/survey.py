@@ -24,11 +24,12 @@ from pipelines.acquisition.machine.drive import Drive
 from pipelines.acquisition.machine.force_sensor import Sensor
 from pipelines.acquisition.machine.machine import Machine
 from pipelines.acquisition.machine.read_only import ReadOnlyMachine, ReadOnlyPart
+from pipelines.acquisition.modbus.device import FOR_NOW
 from pipelines.acquisition.modbus.line import Line
 from pipelines.acquisition.modbus.one_client import greet
 from pipelines.acquisition.modbus.wraparound import RATE_TOLERANCE
 from pipelines.acquisition.pacing import SLOW
-from pipelines.errors import DeviceError, Refused
+from pipelines.errors import DeviceError, Refused, Unanswered
 from pipelines.settings.rig import RigSettings
 from pipelines.settings.rig.recording_only import RecordingRig
 
@@ -50,6 +51,8 @@ class DeviceReport:
     identity: list[dict[str, int]] = field(default_factory=list)
     """``address``, ``expected``, ``found``."""
     latency: Latency | None = None
+    faults: str = ""
+    """How many readings failed, and why the first did."""
     clock: Clock | None = None
     values: dict[str, float] = field(default_factory=dict)
     """Mean of each register, SI units."""
@@ -117,6 +120,8 @@ async def survey(machine: Machine, rate_hz: float | None, *, is_empty: bool) -> 
         else:
             still = probe.take()
             device.latency = Latency.of(still.answered - still.asked)
+            if device.faults:
+                report.findings.append(probe.finding(device.faults))
             present[probe] = device, still
     # In lockstep the drives advance only together.
     if len(present) == len(report.devices) or machine.rig.clock == "real_time":
@@ -165,6 +170,7 @@ async def survey_read_only(
             values = series.of(name)
             device.values[name], device.noise[name] = float(np.mean(values)), float(np.std(values))
     report.notes = _notes(probes)
+    report.notes += [f"{one.name}: {one.faults}" for one in report.devices if one.faults]
     return report
 
 
@@ -195,6 +201,8 @@ async def _measure_device(probe: Probe, report: DeviceReport, earlier: Sequence[
     # Readings of each device alone, and their longest duration; a shorter one shows no clock.
     reads, reads_s = 200, 2.0
     least_s = 1.0 if isinstance(probe.part, ReadOnlyPart) else 0.0
+    # A moving leg tolerates a lost answer only; where nothing moves, any fault costs a row.
+    bearable = DeviceError if isinstance(probe.part, ReadOnlyPart) else Unanswered
     device, loop = probe.part.device, asyncio.get_running_loop()
     identity, read = probe.part.map.identity, probe.part.map.read
 
@@ -207,14 +215,17 @@ async def _measure_device(probe: Probe, report: DeviceReport, earlier: Sequence[
         (value,) = await device.read(entry.address, 1, function=entry.function or read.function)
         report.identity.append({"address": entry.address, "expected": entry.value, "found": value})
     await device.check_identity(identity, read.function)
-    began, count = loop.time(), 0
-    while (
-        not count
-        or (loop.time() < began + reads_s and count < reads)
-        or (loop.time() < began + least_s)
-    ):
-        await probe.read()
+    await probe.read()
+    began, count, faults = loop.time(), 1, list[DeviceError]()
+    while loop.time() < began + (reads_s if count < reads else least_s):
         count += 1
+        try:
+            await probe.read()
+        except bearable as error:
+            faults.append(error)
+    if faults:
+        first = str(faults[0]).removeprefix(f"{device.label}: ")
+        report.faults = f"{len(faults)} of {count} readings failed; the first {first}"
 
 
 async def _explain(
@@ -229,7 +240,9 @@ async def _explain(
     absent = (ExcCodes.GATEWAY_PATH_UNAVIABLE, ExcCodes.GATEWAY_NO_RESPONSE)
     line, finding = probe.part.device.line, None
     try:
-        if isinstance(error, Refused) and error.code not in absent:
+        if isinstance(error, Refused) and error.code in FOR_NOW:
+            pass
+        elif isinstance(error, Refused) and error.code not in absent:
             finding = await _likelier_block(probe, (), rig, rate_hz)
             if not finding:
                 why = await explain_refusal(probe, error)

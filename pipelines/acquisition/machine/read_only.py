@@ -1,19 +1,19 @@
 """A machine that its own controller moves, as exoid reads it: rows with the instants of reading."""
 
 import time
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from math import isfinite
 
 from pipelines.acquisition.machine.machine import all_answers
+from pipelines.acquisition.machine.progress import Progress
 from pipelines.acquisition.modbus.blocks import BlockReader
 from pipelines.acquisition.modbus.device import Device
 from pipelines.acquisition.modbus.line import Line, lines_of
 from pipelines.acquisition.modbus.one_client import greet
-from pipelines.acquisition.modbus.wraparound import Unwrapper
 from pipelines.contracts.joints import Joint
-from pipelines.errors import DeviceError, Unanswered
+from pipelines.errors import DeviceError
 from pipelines.settings.rig.devices import SensorSettings
 from pipelines.settings.rig.recording_only import (
     ForceMap,
@@ -35,8 +35,27 @@ class ReadOnlyPart:
             name, self.map = f"drive {settings.joint}", rig.map.drive[settings.map]
         else:
             name, self.map = f"sensor {settings.cuff}", rig.map.sensor[settings.map]
+        line.reopens = True
         self.device = Device(name, settings.unit, line, rig.safety)
         self.reader = BlockReader(self.device, self.map.read)
+
+    async def begin(self, earlier: Sequence[Device]) -> None:
+        """Connect, check its identity, and read it once.
+
+        Parameters
+        ----------
+        earlier : sequence of Device
+            Those that are connected.
+
+        Raises
+        ------
+        DeviceError
+            It does not answer, refuses, or is another device.
+        """
+        identity, read = self.map.identity, self.map.read
+        await greet(self.device, earlier, partial(self.device.read_anything, identity, read))
+        await self.device.check_identity(identity, read.function)
+        await self.values(in_motion=False)
 
     async def values(self, *, in_motion: bool = True) -> Mapping[str, float]:
         """Return its values, SI units, with the torque at the joint.
@@ -80,7 +99,8 @@ class ReadOnlyRow:
 class ReadOnlyMachine:
     """All devices of a recording-only rig."""
 
-    def __init__(self, rig: RecordingRig) -> None:
+    def __init__(self, rig: RecordingRig, rate_hz: float = 1.0) -> None:
+        """Prepare reading, with the rate of the devices' counters for rows."""
         line_of = lines_of(rig)
         self.parts = [ReadOnlyPart(rig, one, line_of(one)) for one in rig.drive]
         self.parts += [ReadOnlyPart(rig, one, line_of(one)) for one in rig.sensor]
@@ -96,9 +116,12 @@ class ReadOnlyMachine:
         first = self.parts[0].reader.block
         self.has_counter = "sequence" in first.names
         self.has_clock = "time" in first.names
-        self._count = Unwrapper(first.span("sequence") if self.has_counter else 0.0)
-        self._clock = Unwrapper(first.span("time") if self.has_clock else 0.0)
-        self._newest = 0
+        self._progress = [
+            Progress(part.device.label, part.reader.block, rate_hz)
+            if "sequence" in part.reader.block.names
+            else None
+            for part in self.parts
+        ]
 
     @property
     def columns(self) -> list[str]:
@@ -108,46 +131,37 @@ class ReadOnlyMachine:
     async def connect(self) -> None:
         """Open every line and check the identity of every device."""
         for k, part in enumerate(self.parts):
-            identity, read, device = part.map.identity, part.map.read, part.device
             earlier = [other.device for other in self.parts[:k]]
-            await greet(device, earlier, partial(device.read_anything, identity, read))
-            await device.check_identity(identity, read.function)
-            await part.values(in_motion=False)
+            try:
+                await part.begin(earlier)
+            except DeviceError:  # one answer may be lost, or the device busy
+                await part.begin(earlier)
 
-    async def count(self) -> int:
-        """Return the first device's sample counter; the last known one without an answer."""
-        part = self.parts[0]
-        counter = part.reader.block.registers["sequence"]
-        try:
-            words = await part.device.read(
-                counter.address, counter.registers, function=part.reader.function, in_motion=True
-            )
-        except Unanswered:
-            return self._newest
-        return self._note(part.reader.block.only("sequence").decode(words)["sequence"])
+    async def row(self) -> ReadOnlyRow:
+        """Read all devices at once.
 
-    async def row(self) -> ReadOnlyRow | None:
-        """Read all devices at once; None where an answer is missing."""
+        Raises
+        ------
+        DeviceError
+            An answer is missing, or is not credible.
+        """
         asked = time.perf_counter()
-        try:
-            values = await all_answers(part.values() for part in self.parts)
-        except Unanswered:
-            return None
+        values = await all_answers(part.values() for part in self.parts)
         answered = time.perf_counter()
-        first = values[0]
+        instants = [
+            progress and progress.note(of_part, asked, answered)
+            for progress, of_part in zip(self._progress, values, strict=True)
+        ]
+        first = instants[0]
         return ReadOnlyRow(
             tuple(values[k][quantity] for k, quantity, _ in self._picked),
             asked,
             answered,
-            self._note(first["sequence"]) if self.has_counter else None,
-            self._clock(first["time"]) if self.has_clock else None,
+            first.sequence if first else None,
+            first.time if first else None,
         )
 
     def close(self) -> None:
         """Close every line."""
         for part in self.parts:
             part.device.line.close()
-
-    def _note(self, sequence: float) -> int:
-        self._newest = int(self._count(sequence))
-        return self._newest

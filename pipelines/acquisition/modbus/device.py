@@ -48,6 +48,8 @@ INSTEAD = {
     READ_WRITE: "set write.function = 16 in its map",
 }
 """What to do where a device does not know a function."""
+FOR_NOW = (ExcCodes.ACKNOWLEDGE, ExcCodes.DEVICE_BUSY)
+"""Exceptions after which the same request may be answered later."""
 _GATEWAY = "check the cable behind the gateway, and the unit id in the rig file"
 REMEDY: dict[int, str] = {
     ExcCodes.DEVICE_FAILURE: "see the device's manual and its own display",

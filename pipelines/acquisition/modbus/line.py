@@ -68,6 +68,10 @@ class Line:
         """Whether any request was ever answered."""
         self.takes_one_client = False
         """Whether the other end serves no second connection."""
+        self.reopens = False
+        """Whether a lost connection is opened again: only where nothing is moved or written."""
+        self._reopened = 0
+        """How often it was."""
         self._answers = 0
         """Answers on this connection."""
         self._closes: bool | None = None
@@ -184,11 +188,13 @@ class Line:
             try:
                 answer = await self._send(unit, within_s, request, arguments)
             except (ModbusException, OSError):
-                # The request may have met a connection that ends after its first answer.
-                ended = not self.client.connected and not self.traffic.came and self._answers == 1
-                if not ended or self._closes is False:
+                if self.client.connected or self.traffic.came or not self._answers:
                     raise
-                self._closes = True
+                # The request may have met a connection that ends after its first answer.
+                if self._answers == 1 and self._closes is None:
+                    self._closes = True
+                if not (self._closes or self.reopens):
+                    raise
                 answer = await self._send(unit, within_s, request, arguments)
             self._answers += 1
             if self._answers == 2:
@@ -218,8 +224,10 @@ class Line:
         request: Callable[..., Awaitable[ModbusPDU]],
         arguments: dict[str, Any],
     ) -> ModbusPDU:
-        """Send a request, on a new connection where each takes one only."""
-        if self._closes:
+        """Send a request, on a new connection where each takes one only, or one was lost."""
+        lost = self.reopens and not self.client.connected
+        if self._closes or lost:
+            self._reopened += lost and not self._closes
             self.close()
             await self._open(within_s)
         await self._pause()
@@ -307,6 +315,11 @@ class Line:
             notes.append(
                 f"{self.label}: closes its connection after each answer; each request opens a new"
                 " one, which takes time"
+            )
+        if self._reopened:
+            notes.append(
+                f"{self.label}: its connection ended {self._reopened} times; it was"
+                " opened again each time"
             )
         if self.takes_one_client:
             notes.append(f"{self.label}: serves one client; all devices there share a connection")
