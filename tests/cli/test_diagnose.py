@@ -200,7 +200,7 @@ def test_a_fault_of_acquisition_says_that_no_cause_was_looked_for_and_lists_ever
     printed = shown(
         capsys, acquisition_at_fault=True, causes=[], data_faults=[fault, other], **decision
     )
-    assert "No cause was sought. Correct the acquisition, and record again." in printed
+    assert "No cause was sought. Correct the acquisition, or accept it." in printed
     assert "- run_2.parquet, hip_angle_rad: the hip's angle is stuck" in printed
     assert "is anything missing?" not in printed
 
