@@ -18,6 +18,7 @@ from tests.conftest import Outcome
 from tests.diagnosis.machines import PERIOD_S, RATE_HZ, excitation
 
 ROOT = Path(__file__).parents[2]
+pytestmark = pytest.mark.long
 (STAGE,) = re.findall(
     r"```python\n(.*?)```", (ROOT / "docs" / "mechanisms.md").read_text(encoding="utf-8"), re.DOTALL
 )
@@ -29,7 +30,6 @@ from pipelines.mechanics import mechanisms
 mechanisms.__path__.append(sys.argv[1])
 from exoid_cli.app import run
 
-pytestmark = pytest.mark.long
 outcomes = []
 for words in json.loads(sys.argv[2]):
     out, err = io.StringIO(), io.StringIO()
