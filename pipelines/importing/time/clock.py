@@ -135,8 +135,10 @@ def stamps(
     unit = unit_named(settings.unit)
     assert unit is not None, "the map checks its units"
     ratio = unit.factor * settings.scale / settings.count_s
-    # As integers where possible: seconds since 1970 and their nanoseconds need all digits.
-    return values * (round(ratio) if values.dtype.kind == "i" else ratio) + _counts(plus, note)
+    # As integers where possible: seconds since 1970 and their nanoseconds need all digits. Of a
+    # column finer than `plus` no whole number of counts makes one of `plus`.
+    is_whole = values.dtype.kind == "i" and abs(round(ratio) - ratio) <= 1e-9 * ratio
+    return values * (round(ratio) if is_whole else ratio) + _counts(plus, note)
 
 
 def _counts(raw: NDArray, note: Note) -> NDArray:
