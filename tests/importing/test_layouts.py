@@ -1,5 +1,7 @@
 """The layout of a file is read, whatever the tool that wrote it."""
 
+import json
+
 import numpy as np
 import pytest
 import scipy.io
@@ -270,3 +272,25 @@ def test_an_array_of_structs_is_signals_by_their_names(pendulum, tmp_path):
     for name in names:
         assert_allclose(source.load([name])[name], pendulum.torque)
     assert source.clocks[names[2]] == "logsout.Elements.tau.Values.Time"
+
+
+def test_joints_of_a_record_keep_their_names_when_their_order_changes(read):
+    def joints(k):
+        both = [{"name": "hip", "pos": k, "eff": 2 * k}, {"name": "knee", "pos": -k, "eff": 0}]
+        return both[::-1] if k % 7 == 3 else both
+
+    lines = [json.dumps({"t": k / 100, "joints": joints(k)}) for k in range(100)]
+    _, columns = read(lines, "log.jsonl")
+    assert_allclose(columns["joints.hip.pos"], np.arange(100))
+    assert_allclose(columns["joints.hip.eff"], 2 * np.arange(100))
+    assert_allclose(columns["joints.knee.pos"], -np.arange(100))
+
+
+def test_lists_next_to_names_in_changing_order_are_read_by_the_names(read):
+    def record(k):
+        turned = -1 if k % 7 == 0 else 1
+        return {"t": k / 100, "name": ["hip", "knee"][::turned], "q": [k, -k][::turned]}
+
+    _, columns = read([json.dumps(record(k)) for k in range(100)], "log.jsonl")
+    assert_allclose(columns["q.hip"], np.arange(100))
+    assert_allclose(columns["q.knee"], -np.arange(100))

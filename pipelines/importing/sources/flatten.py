@@ -167,9 +167,67 @@ def _only_array(record: Mapping) -> Any:
 
 def _transposed(records: Sequence[Mapping]) -> dict[str, list]:
     """Return a list of values for each key; a record without the key has no value there."""
+    records = _by_their_names(records)
     keys = dict.fromkeys(key for record in records for key in record)
     columns = {key: [record.get(key) for record in records] for key in keys}
     return {key: _filled(values) for key, values in columns.items()}
+
+
+def _by_their_names(records: Sequence[Mapping]) -> list[Mapping]:
+    """Return rows whose parts have names, not places, as a logger may change their order.
+
+    A part is a record with a name in a list, as one of each joint. Where the names in a list
+    change their order between rows, it is also an element of the lists next to them.
+    """
+    parts = {key: [record.get(key) for record in records] for key in records[0]}
+    named = {key for key, values in parts.items() if all(map(_have_names, values))}
+    lists = {k: v for k, v in parts.items() if k.lower() in LABELS and all(map(_are_names, v))}
+    reordered = {key for key, values in lists.items() if len({str(names) for names in values}) > 1}
+    if not named | reordered:
+        return list(records)
+    return [
+        {
+            column: value
+            for key, values in record.items()
+            for column, value in _without_places(record, key, values, named, reordered)
+        }
+        for record in records
+    ]
+
+
+def _without_places(
+    record: Mapping, key: str, values: Any, named: Collection[str], reordered: Collection[str]
+) -> Iterator[tuple[str, Any]]:
+    """Yield the parts of a row's value by their names, where it has named parts."""
+    if key in named:
+        yield key, _signals(values)
+        return
+    names = next((record[name] for name in reordered if _is_as_long(values, record[name])), None)
+    if key in reordered:
+        return
+    yield key, values if names is None else dict(zip(names, values, strict=True))
+
+
+def _have_names(values: Any) -> bool:
+    return is_list_of_records(values) and _are_names([_label(record) for record in values])
+
+
+def _label(record: Mapping) -> Any:
+    return next((value for key, value in record.items() if key.lower() in LABELS), None)
+
+
+def _are_names(values: Any) -> bool:
+    """Return whether values are a list of different names."""
+    return (
+        isinstance(values, list)
+        and bool(values)
+        and all(isinstance(name, str) and name for name in values)
+        and len(set(values)) == len(values)
+    )
+
+
+def _is_as_long(values: Any, names: Sequence[str]) -> bool:
+    return isinstance(values, list) and len(values) == len(names)
 
 
 def _filled(values: list) -> list:
