@@ -3,6 +3,7 @@
 import tomllib
 
 import numpy as np
+import pandas as pd
 import pytest
 from numpy.testing import assert_allclose
 
@@ -38,6 +39,38 @@ def test_joints_with_names_of_rotations_have_their_own_moments(guessed, pendulum
         ("hip_flexion_r", "hip_flexion_r_moment"),
         ("knee_angle_r", "knee_angle_r_moment"),
     ]
+
+
+def test_an_angle_after_another_joint_may_count_from_the_vertical(guessed, pendulum, write_csv):
+    columns = {"time": pendulum.time}
+    for k, name in enumerate(("hip", "knee")):
+        columns[f"{name}_angle"] = np.roll(pendulum.angle, 200 * k)
+        columns[f"{name}_torque"] = np.roll(pendulum.torque, 200 * k)
+    _, doubts = guessed(write_csv(columns))
+    assert "from the vertical" not in doubts["joint[0].angle.zero"]
+    assert "from the vertical" in doubts["joint[1].angle.zero"]
+
+
+def test_a_last_line_of_text_leaves_a_clock_of_dates(guessed, pendulum, write_csv):
+    stamps = pd.Timestamp("2026-03-04 11:59:57") + pd.to_timedelta(pendulum.time, unit="s")
+    path = write_csv(pendulum.columns() | {"time": stamps.strftime("%I:%M:%S.%f %p")})
+    path.write_text(path.read_text() + "end of log,,,\n")
+    text, _ = guessed(path)
+    assert tomllib.loads(text)["time"] == {"column": "time", "unit": "iso8601"}
+
+
+def test_seconds_and_milliseconds_in_two_columns_are_proposed_as_one_clock(
+    guessed, pendulum, write_csv
+):
+    counts = np.rint(1e3 * pendulum.time).astype(np.int64)
+    columns = pendulum.columns() | {"time": 1_770_000_000 + counts // 1000, "frac": counts % 1000}
+    text, _ = guessed(write_csv(columns))
+    assert tomllib.loads(text)["time"] == {
+        "column": "time",
+        "unit": "s",
+        "plus": "frac",
+        "plus_unit": "ms",
+    }
 
 
 def test_a_moment_of_another_joint_than_the_angle_is_unsure(guessed, pendulum, write_csv):

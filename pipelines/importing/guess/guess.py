@@ -253,8 +253,8 @@ def _dates(values: NDArray) -> NDArray | None:
     # The first value alone shows text that is no date, without parsing a long column.
     if np.isnan(whole_nanoseconds(values[:1])).any():
         return None
-    stamps = whole_nanoseconds(values)
-    return stamps if np.isfinite(stamps).all() else None
+    # Text further down is no date, such as a last line that says the log ends.
+    return whole_nanoseconds(values)
 
 
 def _write_geometry(proposal: Proposal, joints: Sequence[JointColumns]) -> None:

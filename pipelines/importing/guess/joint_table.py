@@ -287,7 +287,10 @@ class _JointWriter:
             and fit.reach_rad >= swings_rad
         )
         if fit is None or not shows_gravity:
-            self.proposal.key("zero", 0.0, "reading where the joint is at zero", sure=False)
+            why = "reading where the joint is at zero"
+            if self.where != "joint[0]" and not self.slides:
+                why += "; if it counts from the vertical, subtract the angle of the joint before it"
+            self.proposal.key("zero", 0.0, why, sure=False)
             return
         # A torque of the wrong sign makes gravity point upward.
         down = float(np.angle(-np.exp(1j * fit.down_rad))) if fit.backwards else fit.down_rad

@@ -137,7 +137,9 @@ def _of_two_columns(columns: Mapping[str, NDArray]) -> TimeGuess | None:
         if not (steps.any() and np.isin(steps, (0.0, 1.0)).all() and np.mean(steps) < 0.5):
             continue
         for name, fractions in whole.items():
-            full = next((unit for unit in ("us", "ns") if _fills(fractions, unit)), None)
+            full = next(
+                (unit for unit in ("ms", "us", "100ns", "ns") if _fills(fractions, unit)), None
+            )
             # The fractions start over where a second is full, and nowhere else.
             if full and np.array_equal(np.diff(fractions.astype(float)) < 0.0, steps > 0.0):
                 step = clock.period(_together(values, fractions, full).astype(float))
