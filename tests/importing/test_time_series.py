@@ -103,6 +103,14 @@ def test_seconds_and_nanoseconds_in_two_columns_are_one_clock(imported, pendulum
     )
 
 
+def test_ticks_within_a_second_are_added_to_the_seconds(imported, pendulum, write_csv):
+    ticks = np.rint(1e4 * pendulum.time).astype(np.int64)
+    columns = {"sec": 4812 + ticks // 10**4, "time": ticks % 10**4}
+    text = with_clock('unit = "ms"\nscale = 0.1\nplus = "sec"\nplus_unit = "s"')
+    outcome = imported(write_csv(pendulum.columns() | columns), map_text=text)
+    assert_allclose(outcome.recording().frame["time_s"], pendulum.time, atol=1e-9)
+
+
 def test_a_date_and_its_time_of_day_in_two_columns_are_one_clock(imported, pendulum, write_csv):
     stamps = pd.Timestamp("2026-03-04 23:59:57") + pd.to_timedelta(pendulum.time, unit="s")
     columns = {"day": stamps.strftime("%d.%m.%Y"), "time": stamps.strftime("%H:%M:%S.%f")}
