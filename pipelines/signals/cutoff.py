@@ -113,7 +113,7 @@ def choose_cutoff(
     if chosen > highest:
         return Cutoff(highest, f"{reason}; above {highest:g} Hz there are only reversals")
     return Cutoff(
-        # The filter needs one period of its cut-off at least; a very short recording then has two.
-        max(chosen, 2.0 * rate_hz / samples),
+        # One and a half periods at each end are invalid; a run at rest then keeps a quarter.
+        max(chosen, 4.0 * rate_hz / samples),
         f"{reason}; in acceleration, noise exceeds the signal below that",
     )

@@ -165,3 +165,17 @@ def test_the_cutoff_and_why_stand_in_the_metadata():
 def test_what_cannot_be_filtered_is_refused_in_one_line(time, settings, metadata, message):
     with pytest.raises(InputError, match=message):
         filter_recording(recording(time, 1e-5, **metadata), FilterSettings(**settings))
+
+
+def test_an_uneven_clock_whose_last_sample_rounds_to_the_next_grid_point_is_filtered():
+    """Its last grid point is the least number that is later than the sample."""
+    origin, rate_hz = 0.1, 200.0
+    on_grid = origin + np.arange(3000) / rate_hz
+    before = np.nextafter(on_grid, 0.0)
+    rounded_up = ((before - origin) * rate_hz).astype(int) == np.arange(3000)
+    count = int(np.flatnonzero(rounded_up)[-1]) + 1
+    time = on_grid[:count].copy()
+    time[100:-5:7] += 0.3 / rate_hz
+    time[-1] = before[count - 1]
+    motion = filter_recording(recording(time), FilterSettings(cutoff_hz=12.0)).motion
+    assert np.isfinite(motion.frame["hip_acceleration_rad_s2"]).all()

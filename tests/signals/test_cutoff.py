@@ -1,6 +1,7 @@
 import numpy as np
 import pytest
 
+from pipelines.mechanics.stretches import edge
 from pipelines.signals import cutoff
 from pipelines.signals.welch import Welch
 
@@ -77,3 +78,10 @@ def test_a_fast_joint_keeps_its_motion_next_to_a_slow_one():
     )
     assert chosen.hz > 5.0
     assert "knee moves" in chosen.reason
+
+
+@pytest.mark.parametrize("seconds", [10, 40])
+def test_a_signal_at_rest_gets_a_cutoff_whose_edges_leave_a_part_of_it(seconds):
+    samples = int(seconds * RATE_HZ)
+    chosen = choose_cutoff(np.zeros((samples, 1)), RATE_HZ, ("hip",))
+    assert 2 * edge(RATE_HZ, chosen.hz) < 0.8 * samples
