@@ -22,13 +22,15 @@ from tests.campaigns.vetoes.sessions import REAL, real, simulated
 
 MIX = {"single": 0.5, "none": 0.1, "imperfect": 0.1, "pair": 0.15, "outside": 0.15}
 """Shares of the sessions that hide one effect, nothing, small ones, two, or an unlisted one."""
+MIX_OF_ONE_JOINT = {"single": 0.6, "none": 0.15, "outside": 0.25}
+"""The same of machines of one joint, some of which have too few small effects to draw from."""
 
 
 def planned(sessions: int, seed_base: int) -> list[Case]:
     """Return the simulated sessions: a fifth of machines of one joint, the rest of all worlds."""
     single = sessions // 5
     return mixed(sessions - single, seed_base, MIX, tuple(WORLDS)) + of_one_joint(
-        single, seed_base + sessions
+        single, seed_base + sessions, MIX_OF_ONE_JOINT
     )
 
 
