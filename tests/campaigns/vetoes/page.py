@@ -98,7 +98,8 @@ def _words(title: str, outcomes: Iterable[Outcome]) -> list[str]:
     lines = [
         f"- {one.world}, {one.session}, hides {one.hidden or 'nothing known'}"
         f"{f', {one.fault}, share {one.share:.2f}' if one.fault else ''}."
-        f"{f' {one.words}' if one.words else ''}"
+        # A message of exoid is quoted as it is printed.
+        f"{f'{chr(10) * 2}      {one.words}' if one.words else ''}"
         for one in outcomes
     ]
     return [f"## {title}\n", *(lines or ["None."]), ""]
