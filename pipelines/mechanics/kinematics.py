@@ -269,7 +269,7 @@ class _Grid:
     def __init__(self, stretches: Stretches, number: int, rate_hz: float) -> None:
         self._origin_s = stretches.origin_s[number]
         self._uniform = stretches.uniform[number]
-        # A wrong stamp makes a spline overshoot in the long step beside it, which is no noise that
+        # A wrong stamp makes a spline overshoot in the long step next to it, which is no noise that
         # a low-pass averages out. Between nearly even samples a spline is more accurate.
         self._between: Callable[[NDArray, NDArray], Any] = CubicSpline
         if stretches.uneven:

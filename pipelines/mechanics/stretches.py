@@ -70,13 +70,13 @@ def find_stretches(times: Iterable[NDArray], rate_hz: float) -> Stretches:
     InputError
         If the times do not advance at about ``rate_hz``.
     """
-    found = _Found(rate_hz)
+    collector = _Collector(rate_hz)
     for window in windows((pa.table({"time_s": time}) for time in times), WINDOW, REACH):
-        found.add(window)
-    return found.stretches()
+        collector.add(window)
+    return collector.stretches()
 
 
-class _Found:
+class _Collector:
     """The stretches of the windows so far."""
 
     def __init__(self, rate_hz: float) -> None:

@@ -56,13 +56,13 @@ def are_held(values: NDArray) -> bool:
 
 def remarks(run: Run, columns: Mapping[str, NDArray]) -> list[Finding]:
     """Report the columns (n,) of a run that hold their values, with the rate of the new ones."""
-    rows_hz, found = sample_rate(run.time_s), []
+    rows_hz, findings = sample_rate(run.time_s), []
     for name, values in columns.items():
         if are_held(values):
             new_hz = sample_rate(run.time_s[new_values(values)])
             seen = f"new values at {new_hz:.4g} Hz in rows at {rows_hz:.4g} Hz, repeated between"
-            found.append(Finding(name, seen, 'kept; set time.keep = "new" to leave repeats out'))
-    return found
+            findings.append(Finding(name, seen, 'kept; set time.keep = "new" to leave repeats out'))
+    return findings
 
 
 def only_new(
