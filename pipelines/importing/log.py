@@ -16,7 +16,7 @@ from pipelines.importing.time import clock
 from pipelines.importing.time.clock import Run
 from pipelines.settings import transmission
 from pipelines.settings.import_map import ImportMap, ReadingSettings, TimeSettings
-from pipelines.signals.sampling import missing_samples, sample_rate
+from pipelines.signals.sampling import between_samples, sample_rate
 from pipelines.validation.suggestion import suggestion
 
 
@@ -174,15 +174,9 @@ class Log:
                 f"{where} runs from {time[0]:.6g} to {time[-1]:.6g} s, the log from {at[0]:.6g} to"
                 f" {at[-1]:.6g} s; correct its time_unit, or set its time_offset_s"
             )
-        interpolated = np.interp(at, time, samples, left=np.nan, right=np.nan)
-        gap = missing_samples(time) > 0
-        before = np.clip(np.searchsorted(time, at, "right") - 1, 0, len(gap))
-        # A sample at the edge of a gap is known, although the interval behind it is not.
-        on_sample = time[before] == at
-        interpolated[np.append(gap, False)[before] & ~on_sample] = np.nan
         seen = f"sampled at {sample_rate(time):.4g} Hz by a clock of its own ({column})"
         note(seen, "interpolated linearly, not across its gaps")
-        return interpolated
+        return between_samples(time, samples, at)
 
     def _ahead(self, first: float, own: TimeSettings) -> float:
         """Return the time from the first stamp of the log to the first of another clock, s."""

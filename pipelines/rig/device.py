@@ -10,6 +10,7 @@ from pymodbus.constants import ExcCodes
 from pymodbus.simulator import DataType, SimData, SimDevice
 
 from pipelines.mechanics.motion import CUFFS
+from pipelines.modbus.functions import READ_HOLDING, READ_WRITE, WRITE_MULTIPLE
 from pipelines.modbus.register_block import Block
 from pipelines.rig.clocks import OwnClock
 from pipelines.rig.plant import JOINTS, Samples
@@ -21,10 +22,6 @@ from pipelines.settings.rig.register_map import DriveMap, Identity, SensorMap
 
 if TYPE_CHECKING:
     from pipelines.rig.virtual_rig import VirtualRig
-
-READ_HOLDING, WRITE_MULTIPLE = 3, 16
-READ_WRITE = 23
-"""Function code of the exchange that ends a cycle in lockstep."""
 
 
 class Device(ABC):
@@ -97,6 +94,7 @@ class Device(ABC):
             self.show(self.latched())
             if self.ring:
                 self.ring.show(self.registers, self.first, address, count)
+            # In lockstep this exchange ends a cycle.
             if function == READ_WRITE:
                 self.rig.exchanged(self)
         return None

@@ -82,6 +82,31 @@ def sample_rate(time: NDArray) -> float:
     return whole if whole and abs(whole - rate_hz) * len(time) < 0.01 * rate_hz else rate_hz
 
 
+def between_samples(time: NDArray, values: NDArray, at: NDArray) -> NDArray:
+    """Interpolate linearly between samples, but not across gaps.
+
+    Parameters
+    ----------
+    time : (n,) array
+        Increasing times of the samples, s.
+    values : (n,) array
+        Samples, in any unit.
+    at : (m,) array
+        Times, s.
+
+    Returns
+    -------
+    (m,) array
+        In the unit of ``values``; NaN within gaps, before the first sample and after the last.
+    """
+    result = np.interp(at, time, values, left=np.nan, right=np.nan)
+    is_gap = np.append(missing_samples(time) > 0, False)
+    before = np.searchsorted(time, at, "right").clip(1) - 1
+    # A sample at the edge of a gap is known, although the interval behind it is not.
+    result[is_gap[before] & (time[before] != at)] = np.nan
+    return result
+
+
 def uneven_share(steps: NDArray) -> float:
     """Return the share of steps (n,) without gaps that are more than 2 % off their median."""
     median = np.median(steps)

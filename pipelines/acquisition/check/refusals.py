@@ -8,8 +8,8 @@ from pymodbus.pdu.register_message import ReadWriteMultipleRegistersRequest
 from pipelines.acquisition.check.probe import Probe
 from pipelines.acquisition.machine.drive import Drive
 from pipelines.acquisition.modbus.device import FOR_NOW
-from pipelines.acquisition.modbus.reply import READ_HOLDING, READ_INPUT, READ_WRITE
 from pipelines.errors import DeviceError, Refused
+from pipelines.modbus.functions import READ_HOLDING, READ_INPUT, READ_WRITE
 from pipelines.settings.rig import Register
 
 Named = tuple[str, Register]

@@ -3,8 +3,8 @@
 from collections.abc import Sequence
 
 from pipelines.acquisition.modbus.device import Device
-from pipelines.acquisition.modbus.reply import READ_WRITE, WRITE_MULTIPLE, WRITE_SINGLE
 from pipelines.errors import Unanswered
+from pipelines.modbus.functions import READ_WRITE, WRITE_MULTIPLE, WRITE_SINGLE
 from pipelines.modbus.register_block import Block
 from pipelines.settings.rig.block import MOST_REGISTERS, ReadBlock, registers_of
 from pipelines.settings.rig.register import Register

@@ -9,16 +9,16 @@ from pymodbus.exceptions import ModbusException
 from pymodbus.pdu import ModbusPDU
 
 from pipelines.acquisition.modbus.line import Line
-from pipelines.acquisition.modbus.reply import (
+from pipelines.acquisition.modbus.reply import InvalidReply
+from pipelines.acquisition.modbus.unexpected import described
+from pipelines.errors import DeviceError, Refused, Unanswered
+from pipelines.modbus.functions import (
     READ_HOLDING,
     READ_INPUT,
     READ_WRITE,
     WRITE_MULTIPLE,
     WRITE_SINGLE,
-    InvalidReply,
 )
-from pipelines.acquisition.modbus.unexpected import described
-from pipelines.errors import DeviceError, Refused, Unanswered
 from pipelines.modbus.register_block import Block
 from pipelines.settings.rig.block import ReadBlock, registers_of
 from pipelines.settings.rig.recording_only import WaitSettings

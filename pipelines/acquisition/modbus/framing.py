@@ -7,12 +7,12 @@ from pymodbus.framer.base import FramerBase
 from pymodbus.pdu import DecodePDU, ModbusPDU
 
 from pipelines.acquisition.modbus.unexpected import Asked
+from pipelines.modbus.functions import WRITE_SINGLE
 
 Trace = Callable[[bool, bytes], None]
 """Takes whether bytes were sent, and the bytes."""
 MOST_KEPT = 1024
 """Bytes of one request's time that are kept, to describe them."""
-WRITE_SINGLE = 6
 
 
 class Traffic:

@@ -12,10 +12,16 @@ from pymodbus.pdu import DecodePDU, ExceptionResponse, ModbusPDU
 from pymodbus.pdu.file_message import ReadFifoQueueResponse
 
 from pipelines.acquisition.modbus.framing import RtuFramer, TcpFramer, Traffic
+from pipelines.modbus.functions import (
+    READ_FIFO,
+    READ_HOLDING,
+    READ_INPUT,
+    READ_WRITE,
+    WRITE_MULTIPLE,
+    WRITE_SINGLE,
+)
 
 ERROR = 0x80
-READ_HOLDING, READ_INPUT, WRITE_SINGLE, WRITE_MULTIPLE = 3, 4, 6, 16
-READ_WRITE, READ_FIFO = 23, 24
 ASKED_FOR = (READ_HOLDING, READ_INPUT, WRITE_SINGLE, WRITE_MULTIPLE, READ_WRITE, READ_FIFO)
 
 

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from pipelines.importing.finding import Finding
 from pipelines.importing.time.clock import Run
-from pipelines.signals.sampling import missing_samples, sample_rate
+from pipelines.signals.sampling import between_samples, sample_rate
 
 MANY = 10
 """Least number of new values."""
@@ -102,7 +102,7 @@ def only_new(
     action = f"{len(run) - len(rows)} rows that repeat {', '.join(sorted(together))} left out"
     findings.append(Finding("time", seen, action))
     for name in held.keys() - together:
-        kept[name] = _between(run.time_s[held[name]], columns[name][held[name]], time_s)
+        kept[name] = between_samples(run.time_s[held[name]], columns[name][held[name]], time_s)
         seen = "new values at other instants than the torque's"
         findings.append(Finding(name, seen, "interpolated linearly between them"))
     began_s = run.began_s + float(time_s[0])
@@ -112,11 +112,3 @@ def only_new(
 def _coincide(one: NDArray, other: NDArray) -> bool:
     """Return whether most rows (k,) of the rarer of two channels are also of the other."""
     return len(np.intersect1d(one, other)) > 0.8 * min(len(one), len(other))
-
-
-def _between(time: NDArray, values: NDArray, at: NDArray) -> NDArray:
-    """Return values (n,) interpolated at other times (m,), NaN outside and across gaps."""
-    result = np.interp(at, time, values, left=np.nan, right=np.nan)
-    before = np.clip(np.searchsorted(time, at, "right") - 1, 0, len(time) - 2)
-    result[(missing_samples(time) > 0)[before] & (at != time[before])] = np.nan
-    return result
