@@ -58,7 +58,9 @@ def record_only_on(rig_file, serve, tmp_path):
 
     def run(clock="", fault=None, watchdog_s=10.0, rate_hz=40.0, **hooks):
         port = free_port()
-        served = rig_file("real_time", port, REAL, rest_rad="[0.4, -0.6]", watchdog_s=10.0)
+        # Friction holds the leg at rest, however long the first row takes to come.
+        rest = {"rest_rad": "[0.4, -0.6]", "coulomb_nm": "[60.0, 60.0]"}
+        served = rig_file("real_time", port, REAL, watchdog_s=10.0, **rest)
         path, output = tmp_path / "only.toml", tmp_path / "only.parquet"
         path.write_text(RIG.format(port=port, clock=clock, watchdog_s=watchdog_s))
         settings = RunSettings(name="one", run="exo_alone", purpose="train", duration_s=1.0)

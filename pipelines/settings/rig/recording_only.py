@@ -4,13 +4,20 @@ from pathlib import Path
 from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
+from pydantic.main import IncEx
 
 from pipelines.errors import SettingsError
 from pipelines.settings.base import Positive, Settings, load_toml
+from pipelines.settings.rig.addresses import (
+    check_maps,
+    check_named_lines,
+    line_of,
+    secret_files,
+)
 from pipelines.settings.rig.block import ReadBlock, check_block, registers_of
 from pipelines.settings.rig.devices import ControllerSettings, DeviceSettings, SensorSettings
 from pipelines.settings.rig.geometry import GeometrySettings
-from pipelines.settings.rig.line import LineSettings, TcpLine, check_unit, with_files_near
+from pipelines.settings.rig.line import LineSettings, check_unit, with_files_near
 from pipelines.settings.rig.register import Register
 from pipelines.settings.rig.register_map import Identity
 from pipelines.validation.toml import read_toml
@@ -122,20 +129,10 @@ class RecordingRig(Settings):
         names = [joint.joint for joint in self.drive]
         if len(set(names)) < len(names):
             raise ValueError(f"drive: found {', '.join(names)}, expected each joint once")
-        for kind in ("drive", "sensor"):
-            maps = getattr(self.map, kind)
-            for i, device in enumerate(getattr(self, kind)):
-                if device.map not in maps:
-                    raise ValueError(
-                        f"{kind}[{i}].map: found {device.map!r}, expected a table below"
-                        f" [map.{kind}]: {', '.join(maps) or 'there is none'}"
-                    )
-                if device.line is not None and device.line not in self.line:
-                    raise ValueError(
-                        f"{kind}[{i}].line: found {device.line!r}, expected a table below [line]:"
-                        f" {', '.join(self.line) or 'there is none'}"
-                    )
-        for one in (*self.drive, *self.sensor):
+        devices = (*self.drive, *self.sensor)
+        check_maps(self.map, drive=self.drive, sensor=self.sensor)
+        check_named_lines(devices, self.line)
+        for one in devices:
             check_unit(one.unit, self.line_of(one), one.line)
         for i, joint in enumerate(self.drive):
             scaled = joint.torque_constant_nm_a is not None and joint.gear_ratio is not None
@@ -148,9 +145,7 @@ class RecordingRig(Settings):
 
     def line_of(self, device: DeviceSettings) -> LineSettings:
         """Return the line that a device is on: a shared one, else its own by TCP."""
-        if device.line is None:
-            return TcpLine(host=device.host, port=device.port)
-        return self.line[device.line]
+        return line_of(device, self.line)
 
     def quantities_of(self, joint: RecordedJoint) -> tuple[str, ...]:
         """Return the quantities that a recording has of a joint."""
@@ -160,8 +155,8 @@ class RecordingRig(Settings):
 
     def public(self) -> dict:
         """Return the rig's metadata: all but files with keys."""
-        files = {name: set(line.files) for name, line in self.line.items()}
-        return self.model_dump(mode="json", exclude={"line": files}, exclude_none=True)
+        hidden: IncEx = {"line": secret_files(self.line)}
+        return self.model_dump(mode="json", exclude=hidden, exclude_none=True)
 
 
 def is_recording_only(path: Path | str) -> bool:

@@ -13,6 +13,12 @@ from pydantic.main import IncEx
 
 from pipelines.errors import SettingsError
 from pipelines.settings.base import Positive, Settings, load_toml, repeated
+from pipelines.settings.rig.addresses import (
+    check_maps,
+    check_named_lines,
+    line_of,
+    secret_files,
+)
 from pipelines.settings.rig.block import registers_of
 from pipelines.settings.rig.devices import (
     ControllerSettings,
@@ -22,7 +28,7 @@ from pipelines.settings.rig.devices import (
     SensorSettings,
 )
 from pipelines.settings.rig.geometry import GeometrySettings
-from pipelines.settings.rig.line import LineSettings, TcpLine, check_unit, with_files_near
+from pipelines.settings.rig.line import LineSettings, check_unit, with_files_near
 from pipelines.settings.rig.plant import PlantSettings
 from pipelines.settings.rig.recording_only import refuse_recording_only
 from pipelines.settings.rig.register import DIMENSION
@@ -61,7 +67,7 @@ class RigSettings(Settings):
     def _is_consistent(self) -> Self:
         # First that every name leads to a map or a line: the later checks look them up.
         self._check_joints()
-        self._check_maps()
+        check_maps(self.map, drive=self.drive, sensor=self.sensor)
         self._check_lines()
         self._check_cuffs()
         self._check_virtual()
@@ -83,26 +89,10 @@ class RigSettings(Settings):
                 f"drive: found {', '.join(joints)}, expected one for the hip, then one for the knee"
             )
 
-    def _check_maps(self) -> None:
-        """Refuse a device whose register map is missing."""
-        for kind in ("drive", "sensor"):
-            maps = getattr(self.map, kind)
-            for i, device in enumerate(getattr(self, kind)):
-                if device.map not in maps:
-                    raise ValueError(
-                        f"{kind}[{i}].map: found {device.map!r}, expected a table below"
-                        f" [map.{kind}]: {', '.join(maps) or 'there is none'}"
-                    )
-
     def _check_lines(self) -> None:
         """Refuse missing, unused and duplicate lines, and two devices at one address."""
         devices = (*self.drive, *self.sensor)
-        for device in devices:
-            if device.line is not None and device.line not in self.line:
-                raise ValueError(
-                    f"line: found {device.line!r} at unit {device.unit}, expected a table below"
-                    f" [line]: {', '.join(self.line) or 'there is none'}"
-                )
+        check_named_lines(devices, self.line)
         for name in self.line:
             if name not in {device.line for device in devices}:
                 raise ValueError(
@@ -229,9 +219,7 @@ class RigSettings(Settings):
 
     def line_of(self, device: DeviceSettings) -> LineSettings:
         """Return the line that a device is on: a shared one, else its own by TCP."""
-        if device.line is None:
-            return TcpLine(host=device.host, port=device.port)
-        return self.line[device.line]
+        return line_of(device, self.line)
 
     def turn_of(self, sensor: SensorSettings) -> int:
         """Return the cycle, among its ``every``, in which a sensor is read: they take turns."""
@@ -304,10 +292,8 @@ class RigSettings(Settings):
 
     def public(self) -> dict:
         """Return the rig's metadata: all but the plant, to be identified, and files with keys."""
-        files: IncEx = {name: set(line.files) for name, line in self.line.items()}
-        return self.model_dump(
-            mode="json", exclude={"plant": True, "line": files}, exclude_none=True
-        )
+        hidden: IncEx = {"plant": True, "line": secret_files(self.line)}
+        return self.model_dump(mode="json", exclude=hidden, exclude_none=True)
 
 
 def load_rig(path: Path | str) -> RigSettings:
