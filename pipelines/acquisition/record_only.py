@@ -122,7 +122,7 @@ def _metadata(
         "recording_only": True,
         "controller": loops,
         "geometry": mechanism.geometry | rig.geometry.model_dump(exclude_none=True),
-        "joints": [{"name": joint.joint, "kind": "revolute"} for joint in rig.drive],
+        "joints": [joint.metadata for joint in mechanism.all_joints],
     }
 
 

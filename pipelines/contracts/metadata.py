@@ -5,6 +5,8 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, field_validator
 
+from pipelines.contracts.joint_units import Drive, Kind
+
 Positive = Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
 NotNegative = Annotated[float, Field(ge=0.0, allow_inf_nan=False)]
 Finite = Annotated[float, Field(allow_inf_nan=False)]
@@ -21,8 +23,8 @@ class JointKeys(Keys):
     """One entry of ``joints``."""
 
     name: Annotated[str, Field(pattern=r"^[a-z][a-z0-9_]*$")]
-    kind: Literal["revolute", "prismatic"] = "revolute"
-    drive: Literal["measured", "none"] = "measured"
+    kind: Kind = "revolute"
+    drive: Drive = "measured"
     turns: bool = False
 
 

@@ -18,9 +18,7 @@ from pipelines.importing.finding import Finding, Note, counted, noting
 from pipelines.importing.log import Log, read_log
 from pipelines.importing.quantities.numbers import TAKEN_FOR_MISSING
 from pipelines.importing.sanity import plausibility
-from pipelines.importing.sources.joined import joined, parts_of
-from pipelines.importing.sources.open import open_source
-from pipelines.importing.sources.source import Source
+from pipelines.importing.sources.joined import open_run, parts_of
 from pipelines.importing.time import held
 from pipelines.importing.time.clock import FASTEST_HZ, SLOWEST_HZ, Run, Sampling
 from pipelines.importing.time.period import repeats_after
@@ -75,10 +73,12 @@ def recordings(
             f"{map_path}: no [[recording]] matches {path.name}, only {patterns}; add one"
         )
     with about(path):
-        log = read_log(_opened(path, settings), settings, map_path)
+        source = open_run(path, settings.source, settings.time.column)
+        log = read_log(source, settings, map_path)
         # A bag is a folder; the order makes its list of hashes the same on every system.
         of_bag = sorted(file for file in path.iterdir() if file.is_file()) if path.is_dir() else []
-        files = of_bag or _parts(path, settings)
+        join = settings.source.join
+        files = of_bag or ([path] if join is None else parts_of(path, join))
         provenance = describe(
             inputs=[*files, map_path],
             config=settings.model_dump(mode="json", exclude_none=True),
@@ -101,23 +101,6 @@ def recordings(
                 recording.metadata["imported"] |= of_log
                 recording.metadata.update(provenance)
                 yield recording
-
-
-def _parts(path: Path, settings: ImportMap) -> list[Path]:
-    join = settings.source.join
-    return [path] if join is None else parts_of(path, join)
-
-
-def _opened(path: Path, settings: ImportMap) -> Source:
-    """Return the log in a file, or in the files of a run."""
-    parts = _parts(path, settings)
-    if len(parts) == 1:
-        return open_source(path, settings.source)
-    sources = []
-    for part in parts:
-        with about(part):
-            sources.append(open_source(part, settings.source))
-    return joined(sources, str(settings.time.column))
 
 
 def _check_length(log: Log) -> None:

@@ -31,9 +31,7 @@ def on_even_grid(motion: Motion) -> Motion:
     chosen = motion.metadata.get("regression_filter") or {}
     if not chosen.get("over_time"):
         return motion
-    # Forces and temperatures are read less often than angles.
-    read = None if motion.temperature is None else motion.interpolated_temperature
-    motion = replace(motion, forces=motion.held_forces, temperature=read)
+    motion = motion.with_readings_between()
     stretches = [s for s in motion.segments() if _cells(motion, s) > 0]
     parts = [_of_stretch(motion, stretch) for stretch in stretches]
     columns: dict[str, Any] = {

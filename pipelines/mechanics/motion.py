@@ -251,6 +251,14 @@ class Motion:
         motion.__dict__.update(load_columns=self.load_columns, columns_known=self.columns_known)
         return motion
 
+    def with_readings_between(self) -> "Motion":
+        """Return the run with cuff forces and temperatures at every sample.
+
+        They are read less often than angles: without interpolation most averages would be NaN.
+        """
+        read = None if self.temperature is None else self.interpolated_temperature
+        return replace(self, forces=self.held_forces, temperature=read)
+
     def with_state(self, q: NDArray, dq: NDArray, ddq: NDArray) -> "Motion":
         """Return the same run with other kinematics, as a corrected measurement has.
 

@@ -8,7 +8,7 @@ from pymodbus.exceptions import ModbusException
 
 from pipelines.acquisition.check.finding import Finding
 from pipelines.acquisition.check.probe import Probe
-from pipelines.acquisition.modbus.device import Device
+from pipelines.acquisition.modbus.device import Device, greeting, read_request
 from pipelines.acquisition.modbus.line import Line
 from pipelines.errors import DeviceError, Refused
 from pipelines.settings.rig.line import RtuOverTcpLine, TcpLine
@@ -94,11 +94,6 @@ async def _other_frames(probe: Probe, line: Line) -> str | None:
     return other.transport
 
 
-def _an_address(probe: Probe) -> int:
-    identity = probe.part.map.identity
-    return identity[0].address if identity else probe.block.address
-
-
 async def _other_unit(probe: Probe, probes: Sequence[Probe]) -> int | None:
     """Return a unit that answers in place of a device, with its identity if the file names one."""
     # Longest search; a gateway that reports missing units is faster than a silent bus.
@@ -130,11 +125,10 @@ def _likely_units(unit: int, on_tcp: bool) -> Iterator[int]:
 async def _is(probe: Probe, unit: int) -> bool:
     """Return whether a unit answers, with the device's identity if the rig file names one."""
     line, identity = probe.part.device.line, probe.part.map.identity
-    function = (identity[0].function if identity else None) or probe.part.reader.function
-    client = line.client
-    request = client.read_input_registers if function == 4 else client.read_holding_registers
+    address, function = greeting(identity, probe.part.map.read)
+    request = read_request(line.client, function)
     try:
-        reply = await line.ask(unit, TRIAL_S, request, address=_an_address(probe), count=1)
+        reply = await line.ask(unit, TRIAL_S, request, address=address, count=1)
     except (ModbusException, OSError, DeviceError):
         return False
     words = list(getattr(reply, "registers", []))

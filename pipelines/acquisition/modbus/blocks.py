@@ -113,9 +113,4 @@ class BlockWriter:
         for part in sorted(self._parts, key=lambda one: ("control" in one.names) != control_first):
             begin = part.address - self._block.address
             part_words = words[begin : begin + part.count]
-            if self._function == WRITE_SINGLE:
-                await self._device.write(
-                    part, part_words, function=WRITE_SINGLE, in_motion=in_motion
-                )
-            else:
-                await self._device.write(part, part_words, in_motion=in_motion)
+            await self._device.write(part, part_words, function=self._function, in_motion=in_motion)

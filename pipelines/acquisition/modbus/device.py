@@ -4,6 +4,7 @@ from collections.abc import Awaitable, Callable, Iterable, Sequence
 from contextlib import AbstractAsyncContextManager
 from typing import Any, NamedTuple
 
+from pymodbus.client.base import ModbusBaseClient
 from pymodbus.constants import ExcCodes
 from pymodbus.exceptions import ModbusException
 from pymodbus.pdu import ModbusPDU
@@ -92,10 +93,8 @@ class Device:
         DeviceError
             No answer came in time, or an answer that refuses.
         """
-        first = min(registers_of(block).values(), key=lambda one: one.address)
-        entry = identity[0] if identity else None
-        function = (entry.function if entry else None) or block.function
-        await self.read(entry.address if entry else first.address, 1, function=function)
+        address, function = greeting(identity, block)
+        await self.read(address, 1, function=function)
 
     @property
     def awaited_s(self) -> float:
@@ -155,10 +154,7 @@ class Device:
         """
         action = f"reading {_range(address, count)}"
         time_out = self._in_motion if in_motion else self._at_rest
-        client = self.line.client
-        request = (
-            client.read_input_registers if function == READ_INPUT else client.read_holding_registers
-        )
+        request = read_request(self.line.client, function)
         return await self._ask(action, count, time_out, request, address=address, count=count)
 
     async def read_fifo(self, address: int, words: int) -> list[int]:
@@ -331,6 +327,18 @@ class Device:
         )
         refusal.code = code
         return refusal
+
+
+def greeting(identity: Sequence[Identity], block: ReadBlock) -> tuple[int, int]:
+    """Return address and function of the register that shows whether a device answers."""
+    if identity:
+        return identity[0].address, identity[0].function or block.function
+    return min(one.address for one in registers_of(block).values()), block.function
+
+
+def read_request(client: ModbusBaseClient, function: int) -> Callable[..., Awaitable[ModbusPDU]]:
+    """Return the client's request of a function that reads registers."""
+    return client.read_input_registers if function == READ_INPUT else client.read_holding_registers
 
 
 def _range(address: int, count: int) -> str:

@@ -4,6 +4,7 @@ import asyncio
 import sys
 from collections.abc import AsyncIterator, Awaitable, Callable
 from contextlib import asynccontextmanager, suppress
+from functools import partial
 from typing import Any, cast
 
 import serial
@@ -20,6 +21,8 @@ from pipelines.settings.rig.devices import DeviceSettings
 from pipelines.settings.rig.line import LineSettings, NetworkLine, RtuLine, TlsLine
 from pipelines.settings.rig.recording_only import RecordingRig
 
+Send = Callable[[], Awaitable[ModbusPDU]]
+"""Sends a request, and returns the reply."""
 BAD_SETTINGS: tuple[type[Exception], ...] = (ValueError,)
 """Errors of a serial port that cannot be set up as the rig file says."""
 with suppress(ImportError):  # not on Windows
@@ -170,23 +173,18 @@ class Line:
         ModbusException, OSError
             The device did not answer, but the line is open.
         """
+        send = partial(request, **arguments, device_id=unit)
         if self._holder is asyncio.current_task():
-            return await self._ask(unit, within_s, request, arguments)
+            return await self._ask(unit, within_s, send)
         async with self.turn(unit):
-            return await self._ask(unit, within_s, request, arguments)
+            return await self._ask(unit, within_s, send)
 
-    async def _ask(
-        self,
-        unit: int,
-        within_s: float,
-        request: Callable[..., Awaitable[ModbusPDU]],
-        arguments: dict[str, Any],
-    ) -> ModbusPDU:
+    async def _ask(self, unit: int, within_s: float, send: Send) -> ModbusPDU:
         self._used = True
         self._asked.setdefault(unit, asyncio.get_running_loop().time())
         try:
             try:
-                answer = await self._send(unit, within_s, request, arguments)
+                answer = await self._send(within_s, send)
             except (ModbusException, OSError):
                 if self.client.connected or self.traffic.came or not self._answers:
                     raise
@@ -195,7 +193,7 @@ class Line:
                     self._closes = True
                 if not (self._closes or self.reopens):
                     raise
-                answer = await self._send(unit, within_s, request, arguments)
+                answer = await self._send(within_s, send)
             self._answers += 1
             if self._answers == 2:
                 self._closes = False
@@ -217,13 +215,7 @@ class Line:
                     self._late[unit] = LateReply(within_s)
             self._asking = False
 
-    async def _send(
-        self,
-        unit: int,
-        within_s: float,
-        request: Callable[..., Awaitable[ModbusPDU]],
-        arguments: dict[str, Any],
-    ) -> ModbusPDU:
+    async def _send(self, within_s: float, send: Send) -> ModbusPDU:
         """Send a request, on a new connection where each takes one only, or one was lost."""
         lost = self.reopens and not self.client.connected
         if self._closes or lost:
@@ -234,7 +226,7 @@ class Line:
         # pymodbus uses this one setting as time-out of connections and replies alike.
         self.client.ctx.comm_params.timeout_connect = within_s
         self._asking = self._failed = True
-        return await request(**arguments, device_id=unit)
+        return await send()
 
     def awaited_s(self, unit: int) -> float:
         """Return for how long a unit's reply, or its turn, has been awaited, s; 0 for none."""

@@ -56,7 +56,9 @@ def as_hex(data: bytes, most: int = 16) -> str:
 
 def _as_frames(asked: Asked, came: bytes) -> str | None:
     """Describe bytes that are a whole Modbus frame of either kind."""
-    for transaction, unit, _ in _tcp_frames(came):
+    in_tcp = _tcp_frame(came)
+    if in_tcp is not None:
+        transaction, unit = in_tcp
         if asked.in_rtu:
             return (
                 f"answered in a Modbus TCP frame ({as_hex(came)}), expected RTU; set"
@@ -65,7 +67,7 @@ def _as_frames(asked: Asked, came: bytes) -> str | None:
         if unit != asked.unit:
             return _under_other_unit(asked, unit, came)
         return _of_other_transaction(asked, transaction, came)
-    for unit, _ in _rtu_frames(came):
+    for unit in _rtu_units(came):
         if not asked.in_rtu:
             return (
                 f"answered in an RTU frame ({as_hex(came)}), expected Modbus TCP; set"
@@ -127,18 +129,16 @@ def _is_begun(asked: Asked, came: bytes) -> bool:
     return came[: len(head)] == head[: len(came)]
 
 
-def _tcp_frames(came: bytes) -> Iterator[tuple[int, int, bytes]]:
-    """Yield transaction, unit and content of the Modbus TCP frames at the beginning of bytes."""
-    while len(came) > MBAP + 1 and came[2:4] == b"\0\0":
-        end = MBAP - 1 + int.from_bytes(came[4:6], "big")
-        if not MBAP + 1 < end <= len(came):
-            return
-        yield int.from_bytes(came[:2], "big"), came[6], came[MBAP:end]
-        came = came[end:]
+def _tcp_frame(came: bytes) -> tuple[int, int] | None:
+    """Return transaction and unit of the Modbus TCP frame at the beginning of bytes, if any."""
+    if len(came) <= MBAP + 1 or came[2:4] != b"\0\0":
+        return None
+    end = MBAP - 1 + int.from_bytes(came[4:6], "big")
+    return (int.from_bytes(came[:2], "big"), came[6]) if MBAP + 1 < end <= len(came) else None
 
 
-def _rtu_frames(came: bytes) -> Iterator[tuple[int, bytes]]:
-    """Yield unit and content of the RTU frames in bytes, by their checksums."""
+def _rtu_units(came: bytes) -> Iterator[int]:
+    """Yield the units of the RTU frames in bytes, by their checksums."""
     # The shortest is an exception: unit, function, code and checksum. Noise may come before it.
     shortest = 5
     begin = 0
@@ -146,7 +146,7 @@ def _rtu_frames(came: bytes) -> Iterator[tuple[int, bytes]]:
         for end in range(len(came), begin + shortest - 1, -1):
             body, check = came[begin : end - 2], int.from_bytes(came[end - 2 : end], "big")
             if FramerRTU.check_CRC(body, check):
-                yield body[0], body[1:]
+                yield body[0]
                 begin = end - 1
                 break
         begin += 1

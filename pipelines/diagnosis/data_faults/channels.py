@@ -131,7 +131,8 @@ def _of_one_alone(motion: Motion, joints: tuple[int, int]) -> Proof | None:
     run = averages(motion)
     if run is None:
         return None
-    both = [predictions(run)[j] for j in joints]
+    predicted = predictions(run)
+    both = [predicted[j] for j in joints]
     return compared(both, [min(both, key=lambda one: one.unexplained)])
 
 

@@ -26,10 +26,7 @@ def downsampled(motion: Motion) -> Motion:
     every = BlockAverage(int(motion.sample_rate_hz // enough_hz))
     if every.decimation < 2:
         return motion
-    # Forces and temperatures are read less often than angles: without interpolation most averages
-    # would be NaN.
-    read = None if motion.temperature is None else motion.interpolated_temperature
-    motion = replace(motion, forces=motion.held_forces, temperature=read)
+    motion = motion.with_readings_between()
     starts = every.starts(motion.segment)
     averaged: dict[str, Any] = {
         name: every.mean(getattr(motion, name), starts)

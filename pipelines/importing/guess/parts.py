@@ -7,7 +7,7 @@ from pathlib import Path
 from pipelines.errors import about
 from pipelines.importing.guess.joints import TURNING
 from pipelines.importing.guess.names import meaning
-from pipelines.importing.sources.joined import firsts, joined, parts_of
+from pipelines.importing.sources.joined import firsts, open_run
 from pipelines.importing.sources.open import open_source
 from pipelines.importing.sources.source import Source
 from pipelines.settings.import_map import SourceSettings
@@ -25,8 +25,7 @@ def opened(path: Path, join: Join | None) -> Source:
     """Return the log in a file, or in the files of a run."""
     if join is None:
         return open_source(path, SourceSettings())
-    parts = parts_of(path, join.patterns)
-    return joined([open_source(part, SourceSettings()) for part in parts], join.clock)
+    return open_run(path, SourceSettings(join=join.patterns), join.clock)
 
 
 def runs_to_join(paths: Sequence[Path]) -> tuple[list[Path], Join | None]:

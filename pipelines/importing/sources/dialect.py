@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 from pipelines.errors import InputError
-from pipelines.importing.sources.header import Header, header
+from pipelines.importing.sources.header import Header, header, looks_like_number
 from pipelines.importing.sources.source import numbered_twins
 from pipelines.settings.base import repeated
 from pipelines.settings.import_map import SourceSettings
@@ -277,7 +277,7 @@ def _blocks(
     heads: set[tuple[str, ...]] = set()
     for k, fields in rows:
         inside = [fields[column] for column in numeric if column < len(fields)]
-        numbers = [_looks_like_number(field) for field in inside if not _is_missing(field)]
+        numbers = [looks_like_number(field) for field in inside if not _is_missing(field)]
         if len(fields) >= width and all(numbers) and _are_numbers(fields, decimal):
             blocks[-1].append((k, fields))
         elif len(numbers) == len(numeric) > 1 and not any(numbers) and tuple(fields) not in heads:
@@ -317,7 +317,3 @@ def _is_number(field: str, decimal: str) -> bool:
         )
         is not None
     )
-
-
-def _looks_like_number(field: str) -> bool:
-    return re.fullmatch(r"[-+]?[\d.,]*\d[\d.,]*([eE][-+]?\d+)?", field) is not None

@@ -41,7 +41,7 @@ def header(above: Sequence[Line], width: int, counts_rows: bool) -> Header:
     if by_key is not None:
         return by_key
     # Numbers above the names are facts about the columns, such as gains.
-    words = [line for line in lines if not any(map(_is_number, line))]
+    words = [line for line in lines if not any(map(looks_like_number, line))]
     last = _stripped(words[-1]) if words else []
     names: tuple[str, ...] = ()
     fitting = [k for k, line in enumerate(words) if _fits(line, width)]
@@ -158,5 +158,6 @@ def _filled(names: Line) -> tuple[str, ...]:
     return tuple(name or f"c{k}" for k, name in enumerate(names, 1))
 
 
-def _is_number(text: str) -> bool:
+def looks_like_number(text: str) -> bool:
+    """Return whether text may be a number, with any marks between its digits."""
     return re.fullmatch(r"[-+]?[\d.,]*\d[\d.,]*([eE][-+]?\d+)?", text) is not None

@@ -5,7 +5,35 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from pipelines.errors import InputError, about
+from pipelines.importing.sources.open import open_source
 from pipelines.importing.sources.source import Columns, Source
+from pipelines.settings.import_map import SourceSettings
+
+
+def open_run(path: Path, settings: SourceSettings, clock: str | None) -> Source:
+    """Return the log in a file, or in the files of a run.
+
+    Parameters
+    ----------
+    path : Path
+        Any file of the run.
+    settings : SourceSettings
+        ``join`` names its files.
+    clock : str or None
+        The column of the clock, which each file of several has.
+
+    Raises
+    ------
+    InputError
+        If a file cannot be read, or has no such clock.
+    """
+    if settings.join is None:
+        return open_source(path, settings)
+    sources = []
+    for part in parts_of(path, settings.join):
+        with about(part):
+            sources.append(open_source(part, settings))
+    return joined(sources, str(clock))
 
 
 def firsts(files: Sequence[Path], join: Sequence[str] | None) -> list[Path]:
