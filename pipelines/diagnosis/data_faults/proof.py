@@ -137,10 +137,17 @@ def by_motion(recorded: Motion, mended: Motion | None, channels: int = 1) -> Pro
     Proof or None
         None where a run has too few blocks to fit a body.
     """
-    runs = [None if motion is None else averages(motion) for motion in (recorded, mended)]
-    if runs[0] is None or runs[1] is None:
-        return None
-    return compared(predictions(runs[0]), predictions(runs[1]), channels)
+    return next(iter(by_motions(recorded, [mended], channels)), None)
+
+
+def by_motions(recorded: Motion, mended: Iterable[Motion | None], channels: int = 1) -> list[Proof]:
+    """Return the proofs of several mends of one run, without those that have none."""
+    run = averages(recorded)
+    if run is None:
+        return []
+    before = predictions(run)
+    others = [averages(motion) for motion in mended if motion is not None]
+    return [compared(before, predictions(one), channels) for one in others if one is not None]
 
 
 def by_good_samples(recorded: Motion, session: Sequence[Motion]) -> Proof | None:

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from pipelines.contracts.fault_kind import FaultKind
 from pipelines.diagnosis.data_faults.fault import Fault, column
 from pipelines.diagnosis.data_faults.mends import mended
-from pipelines.diagnosis.data_faults.proof import Proof, Ruling, by_motion
+from pipelines.diagnosis.data_faults.proof import Proof, Ruling, by_motions
 from pipelines.mechanics.motion import Motion
 from pipelines.mechanics.origin import mend_in
 
@@ -59,9 +59,9 @@ def _proof(motion: Motion, quantity: str, joint: int, far: NDArray) -> Proof | N
     proofs = []
     for sign in (1.0, -1.0):
         recorded = _with(motion, quantity, joint, sign * one)
-        ways = [_with(motion, quantity, joint, sign * way) for way in _joined(one, far)]
-        tried = [] if recorded is None else [by_motion(recorded, way) for way in ways]
-        proofs += [proof for proof in tried if proof is not None]
+        if recorded is not None:
+            ways = (_with(motion, quantity, joint, sign * way) for way in _joined(one, far))
+            proofs += by_motions(recorded, ways)
     if not proofs:
         return None
     best = min(proofs, key=lambda proof: proof.mended)

@@ -6,6 +6,7 @@ both joints far better.
 """
 
 from collections.abc import Callable, Iterator, Sequence
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,9 +36,23 @@ SIGN, SWAP = "reversed", "exchanged"
 
 Channels = tuple[tuple[int, str], ...]
 """Numbers of joints, and a quantity of each."""
-Wiring = tuple[Reading, tuple[int, int], tuple[float, float], Channels, str]
-"""Reading of the angles; columns of hip's and knee's torque; their signs; wrong channels, and
-how."""
+
+
+class Wiring(NamedTuple):
+    """A way in which the channels of a leg may be wired."""
+
+    reading: Reading
+    """Of the angles."""
+    columns: tuple[int, int]
+    """Of hip's and knee's torque."""
+    signs: tuple[float, float]
+    """Of these torques."""
+    wrong: Channels
+    """Channels that are not as they should be."""
+    how: str
+    """``SIGN`` or ``SWAP``; empty where all are right."""
+
+
 HIP, KNEE = 0, 1
 """Columns of the joints."""
 STRAIGHT, CROSSED = (HIP, KNEE), (KNEE, HIP)
@@ -45,18 +60,18 @@ STRAIGHT, CROSSED = (HIP, KNEE), (KNEE, HIP)
 BOTH_TORQUES = ((HIP, "torque"), (KNEE, "torque"))
 BOTH_ANGLES = ((HIP, "angle"), (KNEE, "angle"))
 WIRINGS: tuple[Wiring, ...] = (
-    (AS_RECORDED, STRAIGHT, (1.0, 1.0), (), ""),
-    (AS_RECORDED, STRAIGHT, (-1.0, 1.0), ((HIP, "torque"),), SIGN),
-    (AS_RECORDED, STRAIGHT, (1.0, -1.0), ((KNEE, "torque"),), SIGN),
-    (AS_RECORDED, STRAIGHT, (-1.0, -1.0), BOTH_TORQUES, SIGN),
-    (AS_RECORDED, CROSSED, (1.0, 1.0), BOTH_TORQUES, SWAP),
-    (EXCHANGED, STRAIGHT, (1.0, 1.0), BOTH_ANGLES, SWAP),
-    (EXCHANGED, CROSSED, (1.0, 1.0), BOTH_ANGLES + BOTH_TORQUES, SWAP),
+    Wiring(AS_RECORDED, STRAIGHT, (1.0, 1.0), (), ""),
+    Wiring(AS_RECORDED, STRAIGHT, (-1.0, 1.0), ((HIP, "torque"),), SIGN),
+    Wiring(AS_RECORDED, STRAIGHT, (1.0, -1.0), ((KNEE, "torque"),), SIGN),
+    Wiring(AS_RECORDED, STRAIGHT, (-1.0, -1.0), BOTH_TORQUES, SIGN),
+    Wiring(AS_RECORDED, CROSSED, (1.0, 1.0), BOTH_TORQUES, SWAP),
+    Wiring(EXCHANGED, STRAIGHT, (1.0, 1.0), BOTH_ANGLES, SWAP),
+    Wiring(EXCHANGED, CROSSED, (1.0, 1.0), BOTH_ANGLES + BOTH_TORQUES, SWAP),
     # The equations are odd. A reversed hip is a reversed knee with all torques reversed. A hip
     # reversed in both channels looks like such a knee, and both angles look like both torques.
-    (KNEE_REVERSED, STRAIGHT, (1.0, 1.0), ((KNEE, "angle"),), SIGN),
-    (KNEE_REVERSED, STRAIGHT, (-1.0, -1.0), ((HIP, "angle"),), SIGN),
-    (KNEE_REVERSED, STRAIGHT, (1.0, -1.0), ((KNEE, "angle"), (KNEE, "torque")), SIGN),
+    Wiring(KNEE_REVERSED, STRAIGHT, (1.0, 1.0), ((KNEE, "angle"),), SIGN),
+    Wiring(KNEE_REVERSED, STRAIGHT, (-1.0, -1.0), ((HIP, "angle"),), SIGN),
+    Wiring(KNEE_REVERSED, STRAIGHT, (1.0, -1.0), ((KNEE, "angle"), (KNEE, "torque")), SIGN),
 )
 MIRROR_IMAGES: dict[Channels, str] = {
     BOTH_TORQUES: "both angles",
@@ -130,16 +145,16 @@ def _best(
     as_recorded = under(WIRINGS[0])
 
     def misfit(wiring: Wiring) -> float:
-        return sum(one.unexplained for one in under(wiring)) / MOST ** len(wiring[3])
+        return sum(one.unexplained for one in under(wiring)) / MOST ** len(wiring.wrong)
 
     best = min(WIRINGS, key=misfit)
     # An angle takes part in the torque of both joints.
-    torques = {joint for joint, quantity in best[3] if quantity == "torque"}
-    at = torques if all(quantity == "torque" for _, quantity in best[3]) else {HIP, KNEE}
-    chosen = [k for k in range(len(as_recorded)) if k % 2 in at or not best[3]]
+    torques = {joint for joint, quantity in best.wrong if quantity == "torque"}
+    at = torques if all(quantity == "torque" for _, quantity in best.wrong) else {HIP, KNEE}
+    chosen = [k for k in range(len(as_recorded)) if k % 2 in at or not best.wrong]
     mended = under(best)
-    proof = compared([as_recorded[k] for k in chosen], [mended[k] for k in chosen], len(best[3]))
-    return (best if best[3] and proof.removes_most else None), proof
+    proof = compared([as_recorded[k] for k in chosen], [mended[k] for k in chosen], len(best.wrong))
+    return (best if best.wrong and proof.removes_most else None), proof
 
 
 class Wirings:
@@ -163,8 +178,9 @@ class Wirings:
 
     def under(self, wiring: Wiring) -> list[Prediction]:
         """Return the predictions at hip and knee under a wiring."""
-        reading, channels, signs, *_ = wiring
-        return [self._one(reading, j, channels[j], signs[j]) for j in (HIP, KNEE)]
+        return [
+            self._one(wiring.reading, j, wiring.columns[j], wiring.signs[j]) for j in (HIP, KNEE)
+        ]
 
     def _one(self, reading: Reading, joint: int, channel: int, sign: float) -> Prediction:
         key = reading, joint, channel, sign
@@ -181,11 +197,11 @@ class Wirings:
 
 
 def _of_wiring(motion: Motion, wiring: Wiring, proof: Proof) -> Fault:
-    mirror = MIRROR_IMAGES.get(wiring[3], "") if wiring[4] == SIGN else ""
+    mirror = MIRROR_IMAGES.get(wiring.wrong, "") if wiring.how == SIGN else ""
     if mirror:
         mirror = mirror.replace("the hip", the(motion.joints[HIP]))
         mirror = f"reversing {mirror} instead gives the same"
-    return _fault(motion, wiring[3], wiring[4], mirror, proof)
+    return _fault(motion, wiring.wrong, wiring.how, mirror, proof)
 
 
 def cuff_faults(run: Averages) -> Iterator[Fault]:
