@@ -135,10 +135,9 @@ def _refuse_unknown_noise(validate: Sequence[Run], faults: Sequence[Fault]) -> N
         if not np.isfinite(floor[j]):
             usable = sum(int(run.usable[:, j].sum()) for run in validate)
             files = [run.motion.file for run in validate]
-            wrong = "".join(
-                f"; {fault.file}: {fault.in_words}" for fault in faults if fault.file in files
-            )
+            wrong = "; ".join(f"{f.file}: {f.in_words}" for f in faults if f.file in files)
+            remedy = f"correct first {wrong}" if wrong else "validate on longer runs"
             raise InputError(
                 f"{', '.join(files)}: {usable} blocks away from {the(joint)}'s reversals, too few"
-                f" in a row to separate noise from error; validate on longer runs{wrong}"
+                f" in a row to separate noise from error; {remedy}"
             )

@@ -9,6 +9,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from pipelines.contracts.fault_kind import FaultKind
 from pipelines.contracts.table import Table
 from pipelines.diagnosis.data_faults import excluding, find_faults
 from pipelines.diagnosis.data_faults.rigid_fit import averages
@@ -229,6 +230,19 @@ def test_stale_rows_are_counted_and_marked(session):
     fault = only_fault(session)
     assert f"{len(stale)} repeated samples" in fault.what and fault.channel == "all channels"
     assert set(np.flatnonzero(fault.samples)) == set(stale)
+
+
+@pytest.mark.parametrize("rows", [3, 9])
+def test_rows_that_come_faster_than_new_values_are_stale_and_not_saturated(session, rows):
+    frame, metadata = session[SPOILED]
+    values = [name for name in frame.columns if name not in ("time_s", "sequence")]
+    frame[values] = frame[values].iloc[np.arange(len(frame)) // rows * rows].to_numpy()
+    fault = only_fault(session)
+    assert fault.kind == FaultKind.STALE and fault.channel == "all channels"
+    assert fault.samples.mean() == pytest.approx(1 - 1 / rows, abs=0.01)
+    assert "wait for new data" in fault.what
+    metadata["imported"] = "log.csv"
+    assert '`keep = "new"`' in only_fault(session).what
 
 
 @pytest.mark.parametrize("joint", ["hip", "knee"])

@@ -21,13 +21,15 @@ from pipelines.diagnosis.data_faults.fault import (
 from pipelines.diagnosis.data_faults.proof import Proof, compared, predictions
 from pipelines.diagnosis.data_faults.rigid_fit import averages
 from pipelines.mechanics.motion import CUFFS, Motion
+from pipelines.mechanics.origin import read_new_values
 from pipelines.mechanics.stretches import edge
 from pipelines.signals.blocks import dilate
+from pipelines.signals.held import are_held
 
 STALE = 3
 """Fewest rows that repeat the last one while the joint moves: fewer may be an accident."""
 COUNTS = 2.0
-"""Encoder counts that a joint moves in one sample before an equal reading is stale."""
+"""Encoder counts that a joint moves before an equal reading is stale."""
 NOISES = 4.0
 """Standard deviations of the angle's noise that the joint moves in addition."""
 STUCK_ANGLE_S = 0.25
@@ -80,12 +82,9 @@ def _repeated(motion: Motion) -> Iterator[Fault]:
     for j, torque in enumerate(motion.torque.T):
         # A torque that is constant for longer is stuck, whatever the angle does.
         stuck = constant_stretches(torque, round(STUCK_TORQUE_S * motion.sample_rate_hz))
-        same[:, j] &= ~mask_of(stuck, len(torque)) & (not _is_in_steps(torque, stuck))
-    step, change = motion.dq / motion.sample_rate_hz, np.diff(motion.measured_angle, axis=0)
-    count = np.array([_count_of(angle) for angle in motion.measured_angle.T])
-    # Scatter of single steps about the filtered speed; the median ignores the repeated ones.
-    noise = median_abs_deviation(change - step[1:], axis=0, scale="normal")
-    sure = same & (np.abs(step) > COUNTS * count + NOISES * noise)
+        is_coarse = _repeats_itself(torque, stuck) and not are_held(torque)
+        same[:, j] &= ~mask_of(stuck, len(torque)) & (not is_coarse)
+    sure = same & _has_moved(motion, motion.measured_angle, same)
     stale = [j for j in range(len(motion.joints)) if sure[:, j].sum() >= STALE]
     if not stale:
         return
@@ -102,10 +101,33 @@ def _repeated(motion: Motion) -> Iterator[Fault]:
             motion.file,
             WHOLE_ROW if together else column(motion, j, "angle"),
             f"{samples.sum()} repeated samples ({100 * share:.2g} %), {when(motion, intervals)}:"
-            f" {who} gave the last sample's values again while the joint moved; wait for new data"
-            " before reading",
+            f" {who} gave the last sample's values again while the joint moved;"
+            f" {read_new_values(motion)}",
             samples,
         )
+
+
+def _has_moved(motion: Motion, angle: NDArray, same: NDArray) -> NDArray:
+    """Return where a joint has surely moved since its last new angle, (n, J) bool.
+
+    Parameters
+    ----------
+    motion : Motion
+    angle : (n, J) array
+        As measured, rad or m.
+    same : (n, J) bool array
+        Where the drive gave the last sample's values again.
+    """
+    travel = np.cumsum(motion.dq / motion.sample_rate_hz, axis=0)
+    moved = np.zeros(angle.shape, dtype=bool)
+    for j in range(angle.shape[1]):
+        new = np.flatnonzero(~same[:, j])
+        # Scatter of the new angles about the filtered speed.
+        noise = median_abs_deviation(np.diff(angle[new, j] - travel[new, j]), scale="normal")
+        last = new[np.searchsorted(new, np.arange(len(angle)), side="right") - 1]
+        since = np.abs(travel[:, j] - travel[last, j])
+        moved[:, j] = since > COUNTS * _count_of(angle[:, j]) + NOISES * noise
+    return moved
 
 
 def _copied(motion: Motion) -> Iterator[Fault]:
@@ -208,8 +230,8 @@ def _held(motion: Motion, joint: int) -> float:
 def _torque(motion: Motion, joint: int) -> Iterator[Fault]:
     """Report constant torque: at its extreme it is saturated, elsewhere stuck.
 
-    A torque rounded to coarse steps also stays constant. Saturation cannot be detected there, and
-    only an exceptionally long stretch counts as stuck.
+    A torque that is rounded to coarse steps, or held until new values come, also stays constant.
+    Saturation cannot be detected there, and only an exceptionally long stretch counts as stuck.
     """
     torque = motion.torque[:, joint]
     flat = constant_stretches(torque, FLAT_TOP)
@@ -220,7 +242,7 @@ def _torque(motion: Motion, joint: int) -> Iterator[Fault]:
         [np.abs(motion.dq[a:b, joint]).max() > 0.1 * np.ptp(motion.q[:, joint]) for a, b in flat],
         bool,
     )
-    if _is_in_steps(torque, flat[at_top | lasts]):
+    if _repeats_itself(torque, flat[at_top | lasts]):
         at_top = np.zeros_like(at_top)
         lasts &= _outlasts(flat)
     tops, stuck = flat[at_top], flat[~at_top & lasts & moving]
@@ -261,7 +283,7 @@ def _stuck_torque(motion: Motion, joint: int, stuck: NDArray) -> Fault:
     )
 
 
-def _is_in_steps(torque: NDArray, apart: NDArray) -> bool:
+def _repeats_itself(torque: NDArray, apart: NDArray) -> bool:
     """Return whether a torque (n,) mostly repeats its last value outside stretches (runs, 2)."""
     rest = ~mask_of(apart, len(torque))[1:]
     return bool(rest.any()) and float(np.mean(torque[1:][rest] == torque[:-1][rest])) > IN_STEPS

@@ -31,9 +31,9 @@ from pipelines.importing.quantities.numbers import numbers, same_stamps, whole_n
 from pipelines.importing.quantities.wraparound import fill_value
 from pipelines.importing.sources.source import Columns, Source
 from pipelines.importing.time import clock
-from pipelines.importing.time.held import are_held
 from pipelines.importing.time.period import repeats_after
 from pipelines.settings.units import unit_named
+from pipelines.signals.held import are_held
 
 TRAIN = 0.7
 """Share of a run, or of the files, to fit to."""

@@ -1,0 +1,47 @@
+"""Values that are held until new ones come: rows faster than the bus."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+MANY = 10
+"""Least number of new values."""
+
+
+def new_values(values: NDArray) -> NDArray:
+    """Return the rows in which a value differs from the last one, (k,).
+
+    Parameters
+    ----------
+    values : (n,) array
+        In any unit, NaN where missing.
+    """
+    known = np.flatnonzero(np.isfinite(values))
+    return known[np.diff(values[known], prepend=np.nan) != 0.0]
+
+
+def are_held(values: NDArray) -> bool:
+    """Return whether values repeat because new ones come less often than rows.
+
+    Coarse readings repeat, too, but go on by their smallest step. Held ones jump over many.
+
+    Parameters
+    ----------
+    values : (n,) array
+        In any unit, NaN where missing.
+    """
+    new = new_values(values)
+    if len(new) < MANY:
+        return False
+    rows = np.diff(new)
+    # A joint that rests repeats its values for long, whether they are held or not.
+    rows = rows[rows <= 10 * np.median(rows)]
+    repeats = 1.0 - len(rows) / rows.sum()
+    steps = np.diff(np.unique(values[new]))
+    # Differences by rounding in float64 are no steps.
+    steps = steps[steps > 1e-9 * np.ptp(values[new])]
+    if not len(steps):
+        return False
+    jump = float(np.median(np.abs(np.diff(values[new])))) / float(steps.min())
+    # Noise whose median jump is so many steps repeats a reading by chance in a quarter of one in
+    # as many rows; some more is no chance.
+    return bool(repeats > 0.05 + 1.0 / jump)
