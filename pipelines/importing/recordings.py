@@ -225,8 +225,8 @@ def _note_sampling(sampling: Sampling, note: Note) -> None:
     if sampling.gaps:
         longest_gap = max(count for _, count in sampling.gaps) / sampling.rate_hz
         seen = (
-            f"{counted(len(sampling.gaps), 'gap')}, {sampling.missing} samples missing, the longest"
-            f" {longest_gap:.3g} s"
+            f"{counted(len(sampling.gaps), 'gap')}, {counted(sampling.missing, 'sample')} missing,"
+            f" the longest {longest_gap:.3g} s"
         )
         note(seen, "listed in `gaps`; nothing is filled in")
 

@@ -244,7 +244,7 @@ def test_a_run_that_a_fault_leaves_nothing_of_is_left_out_where_others_suffice(m
     }
 
 
-@pytest.mark.parametrize("factor", [1e-2, 1e-6])
+@pytest.mark.parametrize("factor", [1e-2, pytest.param(1e-6, marks=pytest.mark.slow)])
 def test_torques_that_are_all_far_too_small_get_an_answer(motions, factor):
     assert diagnose([replace(m, torque=factor * m.torque) for m in motions]).status
 

@@ -109,6 +109,7 @@ def test_frames_of_the_other_kind_are_found(checked):
         "real_time",
         on_a_line=True,
         changed_line={'transport = "tcp"': 'transport = "rtu_over_tcp"'},
+        connect_s=1.0,
     )
     assert 'answers in other frames; set transport = "tcp"' in str(report.findings[0])
 
