@@ -29,6 +29,8 @@ def are_held(values: NDArray) -> bool:
     values : (n,) array
         In any unit, NaN where missing.
     """
+    # Rows without a value repeat nothing.
+    values = values[np.isfinite(values)]
     new = new_values(values)
     if len(new) < MANY:
         return False

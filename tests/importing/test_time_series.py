@@ -228,6 +228,12 @@ def test_a_coarse_reading_that_repeats_is_not_held(imported, pendulum, write_csv
     assert "new values" not in imported(write_csv(pendulum.columns() | rounded)).printed
 
 
+def test_rows_without_a_value_repeat_nothing(imported, pendulum, write_csv):
+    torque = np.where(np.arange(2000) % 3, np.nan, pendulum.torque)
+    printed = imported(write_csv(pendulum.columns() | {"torque": torque})).printed
+    assert "rows left out" in printed and "new values" not in printed
+
+
 @pytest.mark.parametrize(
     ("stamps", "expected", "sure"),
     [

@@ -59,4 +59,4 @@ class Proposal:
 def _with_reason(text: str, why: str) -> str:
     # Column of the text at which reasons begin.
     column = 44
-    return f"{text.ljust(column)}# {why}" if why else text
+    return f"{text.ljust(column - 1)} # {why}" if why else text
