@@ -8,6 +8,7 @@ import pytest
 from pipelines.contracts.fault_kind import FaultKind
 from pipelines.diagnosis.data_faults import find_faults
 from pipelines.diagnosis.data_faults.proof import Proof, Ruling
+from pipelines.diagnosis.data_faults.sign_bit import _joined
 from pipelines.diagnosis.diagnose import diagnose
 from pipelines.diagnosis.verdict.verdict import verdict
 from pipelines.errors import SettingsError
@@ -141,6 +142,16 @@ def test_a_magnitude_with_a_sign_bit_is_named_for_what_it_is(bit, sign):
 def test_a_torque_that_never_changes_sign_has_one_branch():
     lifted = [replace(m, torque=m.torque + 1.5 * np.abs(m.torque).max()) for m in motions(pendulum)]
     assert not any(fault.kind is FaultKind.SIGN_BIT for fault in find_faults(lifted))
+
+
+def test_only_a_branch_of_the_other_sign_that_jumps_is_joined_to_the_near_one():
+    true = 20.0 * np.sin(np.linspace(0.0, 30.0, 3000))
+    magnitude = np.where(true < 0, 64.0 - true, true)
+    assert any(np.allclose(way, true, atol=0.3) for way in _joined(magnitude, magnitude > 32.0))
+    # Turned round at half of its range, a torque of one sign is as smooth as before.
+    positive = np.abs(true) + 5.0
+    for limit in (12.5, 15.0):
+        assert _joined(positive, positive > limit) == []
 
 
 def test_a_run_that_is_stuck_nearly_throughout_is_judged_by_the_good_samples_of_the_others(legs):

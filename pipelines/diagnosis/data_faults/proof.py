@@ -101,7 +101,7 @@ class Prediction:
 
 
 def predictions(run: Averages) -> list[Prediction]:
-    """Return the prediction of each joint's torque on the half of the run it was not fitted to."""
+    """Return the prediction of each joint's torque on the part of the run it was not fitted to."""
     return [
         Prediction(run.torque[:, j], predicted(run.columns(j), run.torque[:, j]))
         for j in run.joints

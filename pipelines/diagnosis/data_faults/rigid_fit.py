@@ -1,4 +1,4 @@
-"""Predict the torque of one half of a run by a rigid body with friction fitted to the other half.
+"""Predict the torque of each fifth of a run by a rigid body with friction fitted to the others.
 
 Inertia and friction are never negative, and a leg's weight hangs below its joints. So channels with
 a wrong sign, or of another joint, leave an error that no such body explains. A smooth law of each
@@ -22,13 +22,14 @@ BLOCK_S = 0.1
 """Length of the averages, s. It is long, because noise of the angles would look like acceleration
 without torque."""
 LEAST_BLOCKS = 30
-"""Fewest averages to which a body is fitted, half of them at a time."""
+"""Fewest averages to which a body is fitted, four fifths of them at a time."""
 FROM_POSITIVE = np.array([[1.0, 1, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]])
 """X1..X4 from (X1 - X2, X2, X3, X4), none of which is negative: M(q) > 0 needs X1 > X2 > 0."""
 POWERS = 3
 """Degree of the law of a joint's own angle."""
-STRETCHES = 20
-"""Stretches of a run that belong to its two halves in turn: drifts reach both."""
+PARTS, STRETCHES = 5, 20
+"""Parts of a run, each predicted from the others, and stretches that belong to them in turn: drifts
+reach all parts, and seldom has one of them an angle that no other has."""
 AS_RECORDED, KNEE_REVERSED, EXCHANGED = (
     ((0, 1), (1.0, 1.0)),
     ((0, 1), (1.0, -1.0)),
@@ -210,11 +211,12 @@ def joined(columns: Sequence[Columns]) -> Columns:
 
 
 def predicted(columns: Columns, torque: NDArray) -> NDArray:
-    """Return the torque (m,) N·m of each half of the blocks by the values fitted to the other."""
-    halves = np.arange(len(torque)) * STRETCHES // len(torque) % 2 == 0
+    """Return the torque (m,) N·m of each part of the blocks by the values fitted to the others."""
+    part = np.arange(len(torque)) * STRETCHES // len(torque) % PARTS
     result = np.empty(len(torque))
-    for half in (halves, ~halves):
-        result[half] = columns.at(half).torque(fit(columns.at(~half), torque[~half]))
+    for k in range(PARTS):
+        own = part == k
+        result[own] = columns.at(own).torque(fit(columns.at(~own), torque[~own]))
     return result
 
 

@@ -90,11 +90,20 @@ def _far_branches(x: NDArray, most: int) -> list[NDArray]:
 
 
 def _joined(x: NDArray, far: NDArray) -> list[NDArray]:
-    """Return the channel (n,) with its far branch from zero on, of either direction."""
+    """Return the channel (n,) with its far branch as the near one's other sign.
+
+    Where it goes from one branch to the other, it must jump less than as recorded.
+    """
+    other_sign = -np.sign(np.median(x[~far]))
+    ends = (x[far].min(), x[far].max())
+    ways = [np.where(far, sign * (x - end), x) for sign in (1.0, -1.0) for end in ends]
+    between = far[1:] != far[:-1]
+
+    def jump(one: NDArray) -> float:
+        return float(np.abs(np.diff(one))[between].sum())
+
     return [
-        np.where(far, sign * (x - end), x)
-        for sign in (1.0, -1.0)
-        for end in (x[far].min(), x[far].max())
+        way for way in ways if np.sign(np.median(way[far])) == other_sign and jump(way) < jump(x)
     ]
 
 

@@ -160,7 +160,7 @@ def _best(
 class Wirings:
     """The torque of both joints of a run under each wiring, and its prediction.
 
-    A body fitted to one half of the run predicts the other half; where other runs are given, one
+    A body fitted to the other parts of the run predicts each part; where other runs are given, one
     fitted to these, as recorded.
     """
 
