@@ -469,6 +469,13 @@ def test_a_name_that_stands_twice_is_reported_and_refused_where_the_map_uses_it(
     assert imported(path, map_text=MAP.replace('"angle"', '"angle#2"')).code == 0
 
 
+def test_a_column_that_is_missing_is_sought_beside_its_own(imported, pendulum, write_csv):
+    columns = {"time": pendulum.time, "leg.data": pendulum.angle, "arm.q": pendulum.angle}
+    path = write_csv(columns | {"arm.torque": pendulum.torque})
+    refused = imported(path, map_text=MAP.replace('"angle"', '"arm.data"'))
+    assert refused.code == 2 and refused.err.rstrip().endswith("known are arm.q, arm.torque")
+
+
 def test_a_log_too_short_for_its_spans_says_from_when_to_when(imported, pendulum, write_csv):
     columns = {name: values[:30] for name, values in pendulum.columns().items()}
     outcome = imported(write_csv(columns), map_text=MAP.partition("[[recording]]")[0])
