@@ -473,7 +473,7 @@ def test_a_column_that_is_missing_is_sought_beside_its_own(imported, pendulum, w
     columns = {"time": pendulum.time, "leg.data": pendulum.angle, "arm.q": pendulum.angle}
     path = write_csv(columns | {"arm.torque": pendulum.torque})
     refused = imported(path, map_text=MAP.replace('"angle"', '"arm.data"'))
-    assert refused.code == 2 and refused.err.rstrip().endswith("known are arm.q, arm.torque")
+    assert refused.code == 2 and refused.err.rstrip().endswith("did you mean arm.q?")
 
 
 def test_a_log_too_short_for_its_spans_says_from_when_to_when(imported, pendulum, write_csv):
