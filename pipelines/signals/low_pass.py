@@ -83,22 +83,34 @@ def low_pass(x: NDArray, rate_hz: float, cutoff_hz: float, order: int = ORDER) -
     (n, ...) array
         Filtered samples, in the unit of ``x``.
     """
-    from scipy.signal import sosfiltfilt
+    from scipy.signal import sosfilt
 
-    sections = _sections(order, cutoff_hz, rate_hz)
-    # scipy refuses a padding that is as long as the data.
+    sections, steady = _sections(order, cutoff_hz, rate_hz)
+    # One sample less than the data: a point reflection needs them.
     padding = min(len(x) - 1, _padding(rate_hz, cutoff_hz))
-    return np.ascontiguousarray(sosfiltfilt(sections, x, axis=0, padlen=padding))
+    columns = x.reshape(len(x), -1)
+    before = 2.0 * columns[0] - columns[padding:0:-1]
+    after = 2.0 * columns[-1] - columns[-2 : -2 - padding : -1]
+    y = np.concatenate([before, columns, after])
+    for _ in range(2):
+        # Each pass begins as if its first sample had lasted for ever.
+        y = sosfilt(sections, y, axis=0, zi=steady * y[0])[0][::-1]
+    return np.ascontiguousarray(y[padding : padding + len(x)].reshape(x.shape))
 
 
-# The design takes longer than filtering a short stretch.
+# The design takes longer than filtering a short stretch: ``scipy.signal.sosfiltfilt`` computes the
+# same, and the steady state again at each call.
 @lru_cache
-def _sections(order: int, cutoff_hz: float, rate_hz: float) -> NDArray:
-    """Return the filter's second-order sections, (order / 2, 6)."""
-    from scipy.signal import butter
+def _sections(order: int, cutoff_hz: float, rate_hz: float) -> tuple[NDArray, NDArray]:
+    """Return the second-order sections (s, 6), and their steady state (s, 2, 1) at an input of 1.
+
+    There are half as many sections as the order.
+    """
+    from scipy.signal import butter, sosfilt_zi
 
     # Second-order sections stay accurate where the cut-off is a small part of the sample rate.
-    return np.asarray(butter(order, cutoff_hz, fs=rate_hz, output="sos"))
+    sections = np.asarray(butter(order, cutoff_hz, fs=rate_hz, output="sos"))
+    return sections, sosfilt_zi(sections)[:, :, np.newaxis]
 
 
 @lru_cache

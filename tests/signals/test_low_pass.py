@@ -1,6 +1,7 @@
 import numpy as np
 import pytest
-from numpy.testing import assert_allclose
+from numpy.testing import assert_allclose, assert_array_equal
+from scipy.signal import butter, sosfiltfilt
 
 from pipelines.signals.low_pass import derivative, low_pass
 
@@ -36,3 +37,11 @@ def test_derivatives_of_a_parabola_are_exact_to_the_very_edge():
     x = 3 + 2 * TIME + 0.5 * TIME**2
     assert_allclose(derivative(x, RATE_HZ, 1), 2 + TIME, atol=1e-9)
     assert_allclose(derivative(x, RATE_HZ, 2), np.ones_like(TIME), atol=1e-6)
+
+
+@pytest.mark.parametrize(("shape", "order", "padding"), [((300,), 2, 48), ((40, 2, 3), 5, 39)])
+def test_it_is_scipys_filter_to_the_last_bit(shape, order, padding):
+    x = np.random.default_rng(2).normal(size=shape)
+    sections = butter(order, 12.5, fs=200.0, output="sos")
+    expected = sosfiltfilt(sections, x, axis=0, padlen=padding)
+    assert_array_equal(low_pass(x, 200.0, 12.5, order), expected)
