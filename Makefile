@@ -63,7 +63,7 @@ estimators: $(INSTALLED) ## what docs/estimators.md says of the methods, measure
 peers: $(VENV)/.peers ## the same recordings through exoid and other tools, and docs/peers.md from what came of it
 	$(BIN)/python -m tests.campaigns.peers docs/peers.md
 
-real: $(INSTALLED) ## what docs/real-data.md says of other people's machines, measured on ../shared/data; some minutes
+real: $(INSTALLED) ## what docs/real-data.md says of other people's machines, measured on the data in EXOID_REAL_DATA; some minutes
 	$(BIN)/python -m tests.campaigns.real docs/real-data.md
 
 fuzz: $(INSTALLED) ## hostile replies against the client, hostile requests against the rig: 60,000 of each

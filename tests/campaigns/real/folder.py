@@ -1,4 +1,4 @@
-"""Where the real data are: shared/data next to the checkout, or the folder in EXOID_REAL_DATA."""
+"""Where the real data are: the folder in EXOID_REAL_DATA, by default build/real-data."""
 
 import os
 from pathlib import Path
@@ -7,4 +7,5 @@ from pathlib import Path
 def real_data_folder() -> Path:
     """Return the folder of recordings that other people made on real machines, whether it is there
     or not."""
-    return Path(os.environ.get("EXOID_REAL_DATA") or Path(__file__).parents[4] / "shared" / "data")
+    default = Path(__file__).parents[3] / "build" / "real-data"
+    return Path(os.environ.get("EXOID_REAL_DATA") or default).absolute()

@@ -42,7 +42,7 @@ class Logs:
         """What a user types to get from these logs to a verdict."""
         options = " ".join(("", *self.known_options))
         return (
-            f"exoid import ../shared/data/{self.files} --map datasets/maps/{self.map} -o"
+            f"exoid import $EXOID_REAL_DATA/{self.files} --map datasets/maps/{self.map} -o"
             f" recordings/\nexoid diagnose recordings/*.parquet{options} --out diagnosed/"
         )
 
