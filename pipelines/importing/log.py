@@ -205,8 +205,10 @@ def read_log(source: Source, settings: ImportMap, map_path: Path) -> Log:
             )
         if name not in source.names:
             # Names that were numbered for want of a header explain the most.
-            beside = [one for one in source.names if one.startswith(name.rpartition(".")[0] + ".")]
-            reason = "; ".join(source.remarks) or suggestion(name, beside or list(source.names))
+            siblings = [
+                one for one in source.names if one.startswith(name.rpartition(".")[0] + ".")
+            ]
+            reason = "; ".join(source.remarks) or suggestion(name, siblings or list(source.names))
             raise SettingsError(
                 f"has no column {name!r}, which {where} in {map_path} names; {reason}"
             )

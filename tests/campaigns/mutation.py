@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 ROOT = Path(__file__).parents[2]
-COPIED = ("pipelines", "exoid_cli", "tests", "datasets", "pyproject.toml")
+COPIED = ("pipelines", "exoid_cli", "tests", "datasets", "docs", "pyproject.toml")
 LEAST_KILLED = 0.9
 
 
