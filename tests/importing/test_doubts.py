@@ -232,3 +232,32 @@ def test_an_angle_that_is_blank_where_the_torque_is_logged_is_interpolated(
     assert len(frame) > 650
     truth = pendulum.angle[1::2][: len(frame)]
     assert_allclose(frame["joint_angle_rad"], truth, atol=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("angle", "torque"),
+    [
+        ("Position [0.01 deg]", "Torque [0.1 Nm]"),
+        ("Position [deg/100]", "Torque [Nm/10]"),
+        ("Position_deg_x100", "Torque_Nm_x10"),
+        ("Position [1e-2 deg]", "Torque [dNm]"),
+        ("Position_cdeg", "Torque_dNm"),
+    ],
+)
+def test_a_unit_with_a_factor_or_a_prefix_is_not_read_as_the_unit_alone(
+    guessed, pendulum, write_csv, angle, torque
+):
+    columns = {"time": pendulum.time, angle: 100.0 * np.degrees(pendulum.angle)}
+    _, doubts = guessed(write_csv(columns | {torque: 10.0 * pendulum.torque}))
+    assert {"joint[0].angle.unit", "joint[0].torque.unit"} <= doubts.keys()
+
+
+def test_a_factor_in_a_name_is_given_with_the_keys_to_set(guessed, pendulum, write_csv):
+    columns = {
+        "Time [0.1 ms]": np.round(1e4 * pendulum.time).astype(int),
+        "Position [deg]": np.degrees(pendulum.angle),
+        "Torque [0.1 Nm]": 10.0 * pendulum.torque,
+    }
+    _, doubts = guessed(write_csv(columns))
+    assert "its name says '0.1 ms': set unit and scale" in doubts["time.unit"]
+    assert "its name says '0.1 Nm': set unit and scale" in doubts["joint[0].torque.unit"]

@@ -210,6 +210,8 @@ def _guess(
             )
     if not is_named:
         why += "; no name shows which column is the time"
+    if meaning.unread:
+        why += f"; its name says {meaning.unread!r}: set unit and scale by that"
     if not is_usual:
         usual = clock.usual_units(step)
         why += f", no usual rate: is it {' or '.join(usual) or 'another column'}?"
@@ -222,6 +224,7 @@ def _guess(
         unit_sure=is_named
         and is_usual
         and not others
+        and not meaning.unread
         and (unit not in LONG or bool(known or epoch)),
         wraps_at=wraps_at,
         restarts=restarts,
