@@ -261,3 +261,22 @@ def test_a_factor_in_a_name_is_given_with_the_keys_to_set(guessed, pendulum, wri
     _, doubts = guessed(write_csv(columns))
     assert "its name says '0.1 ms': set unit and scale" in doubts["time.unit"]
     assert "its name says '0.1 Nm': set unit and scale" in doubts["joint[0].torque.unit"]
+
+
+def test_a_channel_with_values_in_the_rows_of_a_clock_has_that_clock(guessed, pendulum, write_csv):
+    """Two devices in one table, the slower one with fewer rows."""
+    slow = len(pendulum.time) // 4
+
+    def ended(values):
+        return [*map(str, values[::4]), *[""] * (len(values) - slow)]
+
+    columns = {
+        "enc_time_s": ended(pendulum.time),
+        "enc_angle_rad": ended(pendulum.angle),
+        "daq_time_s": pendulum.time,
+        "daq_torque_Nm": pendulum.torque,
+    }
+    text, doubts = guessed(write_csv(columns))
+    (joint,) = tomllib.loads(text)["joint"]
+    assert joint["angle"]["time"] == "enc_time_s"
+    assert "time_offset_s" in doubts["time.column"]

@@ -120,7 +120,9 @@ def guess_time(
     for meaning in sorted(candidates, key=lambda m: m.unit is None):
         guess = _guess(meaning, columns[meaning.column].astype(float), meaning in coarse, typed)
         if guess is not None:
-            clocks = [(m.column, _unit(m, typed) or guess.unit) for m in named + coarse]
+            # A slower clock of a table ends before the others, or is blank in rows between.
+            partial = [m for m in meanings if m not in named and _advances_in_its_rows(m, columns)]
+            clocks = [(m.column, _unit(m, typed) or guess.unit) for m in named + coarse + partial]
             return replace(guess, rivals=tuple(_rivals(guess, clocks, columns)))
     return None
 
@@ -375,6 +377,7 @@ def write_time(proposal: Proposal, guess: TimeGuess, held: Sequence[str]) -> Non
         why += ", as no other does"
     if guess.rivals:
         why += f", and so does {' and '.join(guess.rivals)}: name it as `time` of its channels"
+        why += ", with time_offset_s if they did not begin together"
     proposal.key("column", guess.column, why, guess.sure and not guess.rivals)
     proposal.key("unit", guess.unit, guess.why, guess.unit_sure)
     if guess.plus is not None:
@@ -398,6 +401,15 @@ def _advances(values: NDArray, is_named: bool) -> bool:
     if np.all(steps == 1.0) and not is_named:
         return False
     return bool(np.mean(steps > 0) > ADVANCES)
+
+
+def _advances_in_its_rows(meaning: Meaning, columns: Mapping[str, NDArray]) -> bool:
+    """Return whether a column that is named a clock is one, but for rows without a stamp."""
+    values = columns[meaning.column]
+    if meaning.quantity != "time" or values.dtype.kind != "f":
+        return False
+    known = np.isfinite(values)
+    return not known.all() and _advances(values[known], is_named=True)
 
 
 def _stands_still(values: NDArray) -> bool:
