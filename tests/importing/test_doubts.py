@@ -280,3 +280,16 @@ def test_a_channel_with_values_in_the_rows_of_a_clock_has_that_clock(guessed, pe
     (joint,) = tomllib.loads(text)["joint"]
     assert joint["angle"]["time"] == "enc_time_s"
     assert "time_offset_s" in doubts["time.column"]
+
+
+def test_the_sign_of_a_torque_is_unsure_where_its_column_is(guessed, pendulum, write_csv):
+    """Without names, another joint's motion explains a torque with the opposite sign, too."""
+    columns = {
+        "a": pendulum.time,
+        "b": pendulum.angle,
+        "c": pendulum.velocity,
+        "d": -pendulum.torque,
+    }
+    text, doubts = guessed(write_csv(columns))
+    assert tomllib.loads(text)["joint"][0]["torque"]["sign"] == -1
+    assert {"joint[0].torque.column", "joint[0].torque.sign"} <= doubts.keys()

@@ -375,21 +375,27 @@ class _JointWriter:
         return f"{before}its name says {text!r}: set unit and scale by that" if text else ""
 
     def _write_torque_sign(self, fit: TorqueFit | None) -> None:
+        sign, sure = 1, False
         if fit is None:
             why = "positive torque must accelerate the angle upward; not visible in this log"
-            self.proposal.key("sign", 1, why, sure=False)
         elif not fit.proves:
             why = f"the motion explains {max(0.0, fit.explained):.0%} of the torque"
             why += f", and {max(0.0, fit.rival):.0%} of one shifted in time"
-            self.proposal.key("sign", 1, why, sure=False)
         elif fit.backwards:
+            sign, sure = -1, True
             why = "reversed, it accelerates the joint and overcomes its friction"
-            self.proposal.key("sign", -1, f"{why} ({fit.explained:.0%} fits)")
+            why += f" ({fit.explained:.0%} fits)"
         elif fit.inertia > 0.0 and fit.friction > 0.0:
+            sure = True
             why = "accelerates the joint and overcomes its friction"
-            self.proposal.key("sign", 1, f"{why} ({fit.explained:.0%} fits)")
+            why += f" ({fit.explained:.0%} fits)"
         else:
-            self.proposal.key("sign", 1, "inertia and friction disagree about it", sure=False)
+            why = "inertia and friction disagree about it"
+        # The motion of another joint explains a torque, too, often with the opposite sign.
+        if sure and self.joint.drive in self.joint.doubtful:
+            sure = False
+            why += ", if this is the joint's torque"
+        self.proposal.key("sign", sign, why, sure)
 
 
 def _when_off(switch: NDArray) -> str:
