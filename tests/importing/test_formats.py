@@ -372,3 +372,23 @@ def test_a_guess_takes_durations_of_parquet_for_ns_whatever_their_name_says(
     )
     frame = imported(path, map_text=text).recording("log_train").frame
     assert_allclose(frame["time_s"], pendulum.time[: len(frame)], atol=1e-9)
+
+
+def test_records_of_hdf5_may_have_text_and_records_of_several_joints(imported, pendulum, tmp_path):
+    """Samples along the first axis, each with a state in words and a part for each joint."""
+    h5py = pytest.importorskip("h5py")
+    part = [("pos", "f8"), ("trq", "f4")]
+    records = np.zeros(len(pendulum.time), [("t", "f8"), ("axis", part, (2,)), ("mode", "S8")])
+    records["t"], records["mode"] = pendulum.time, b"OP"
+    records["axis"]["pos"][:, 1] = pendulum.angle
+    records["axis"]["trq"][:, 1] = pendulum.torque
+    path = tmp_path / "log.h5"
+    with h5py.File(path, "w") as file:
+        file["run/samples"] = records
+    map_text = MAP.replace('"time"', '"run/samples.t"', 1)
+    map_text = map_text.replace('"angle"', '"run/samples.axis.pos[1]"')
+    map_text = map_text.replace('"torque"', '"run/samples.axis.trq[1]"')
+    map_text = "\n".join(line for line in map_text.splitlines() if "velocity" not in line)
+    frame = imported(path, map_text=map_text).recording().frame
+    assert_allclose(frame["pivot_angle_rad"], pendulum.angle, atol=1e-9)
+    assert_allclose(frame["pivot_torque_nm"], pendulum.torque, atol=1e-5)
