@@ -293,3 +293,18 @@ def test_the_sign_of_a_torque_is_unsure_where_its_column_is(guessed, pendulum, w
     text, doubts = guessed(write_csv(columns))
     assert tomllib.loads(text)["joint"][0]["torque"]["sign"] == -1
     assert {"joint[0].torque.column", "joint[0].torque.sign"} <= doubts.keys()
+
+
+def test_a_joint_whose_torque_is_zero_throughout_is_proposed_as_passive(
+    guessed, pendulum, write_csv
+):
+    """As ROS writes the effort of a joint without a drive."""
+    columns = {"time": pendulum.time}
+    for k in (0, 1):
+        columns[f"position{k}"] = np.roll(pendulum.angle, 200 * k)
+        columns[f"effort{k}"] = (1 - k) * pendulum.torque
+    text, doubts = guessed(write_csv(columns))
+    first, second = tomllib.loads(text)["joint"]
+    assert first["torque"]["column"] == "effort0" and "drive" not in first
+    assert second["drive"] == "none" and "torque" not in second
+    assert "effort1 is 0 throughout" in doubts["joint[1].drive"]

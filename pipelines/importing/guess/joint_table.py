@@ -134,6 +134,10 @@ class _JointWriter:
         if self.too_far:
             why = f"{self.turns:.4g} turns; remove it if another unit or gear_ratio is right"
             self.proposal.key("turns", True, why, sure=False)
+        if self.joint.zero_torque:
+            self.used.append(self.joint.zero_torque)
+            why = f"{self.joint.zero_torque} is 0 throughout, as of a passive joint"
+            self.proposal.key("drive", "none", why, sure=False)
         if self.joint.enabled:
             self.used.append(self.joint.enabled)
             self.proposal.key("enabled", self.joint.enabled, _when_off(columns[self.joint.enabled]))
@@ -174,6 +178,8 @@ class _JointWriter:
     def write_torque(self, fit: TorqueFit | None) -> None:
         """Write the table of torque or force."""
         drive = self.joint.drive
+        if self.joint.zero_torque:
+            return
         if drive is None:
             self.proposal.table("[joint.torque]", f"{self.where}.torque")
             self.proposal.unknown("column", "no column is named torque, current or voltage")
