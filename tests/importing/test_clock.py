@@ -309,3 +309,12 @@ def test_dates_with_the_day_first_are_read_and_what_is_none_is_refused_by_what_i
     )
     assert (american.code, american.err.count("\n")) == (2, 1)
     assert "has '03/05/24 11.59', expected a date such as 2026-01-31" in american.err
+
+
+def test_fractions_without_leading_zeros_are_refused_as_that(imported, pendulum, write_csv):
+    """As ``printf("%d.%d")`` writes seconds and microseconds."""
+    microseconds = np.round(1e6 * pendulum.time).astype(int)
+    stamps = [f"{t // 10**6}.{t % 10**6}" for t in microseconds]
+    outcome = imported(write_csv(pendulum.columns() | {"time": stamps}))
+    assert outcome.code == 2
+    assert "without their leading zeros" in outcome.err and "time.rate_hz" in outcome.err

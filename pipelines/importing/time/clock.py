@@ -293,6 +293,7 @@ def runs(time_s: NDArray, raw: NDArray, count_s: float, note: Note = unnoted) ->
     # Outliers first: one stamp far ahead would look like a clock that starts over after it.
     rows = _without_outliers(rows, time_s, note)
     begins = _begins(time_s[rows])
+    _check_fractions(raw[rows], begins[1:])
     for k in begins[1:]:
         back = time_s[rows[k - 1]] - time_s[rows[k]]
         seen = f"clock starts over at row {rows[k]}, {back:.6g} s back"
@@ -300,6 +301,24 @@ def runs(time_s: NDArray, raw: NDArray, count_s: float, note: Note = unnoted) ->
         note(seen, _if_full(float(raw[rows[k - 1]]), float(raw[rows[k]]), step, count_s))
     parts = [_ordered(part, time_s) for part in np.split(rows, begins[1:])]
     return [run for run in parts if len(run) > 1]
+
+
+def _check_fractions(stamps: NDArray, restarts: Sequence[int]) -> None:
+    """Refuse a clock that starts over again and again, but never leaves its second.
+
+    Seconds and microseconds that were put together without leading zeros do so: 5 ms after 12 s
+    become 12.5000.
+    """
+    # Once or twice a clock may be set back within a second by chance.
+    by_chance = 2
+    whole = np.floor(stamps.astype(float))
+    at = np.asarray(restarts, dtype=int)
+    if len(at) > by_chance and np.all(whole[at] == whole[at - 1]) and np.all(np.diff(whole) >= 0.0):
+        raise InputError(
+            f"its clock goes back {len(at)} times, but its whole part never does: fractions are"
+            " written without their leading zeros. Correct the stamps, or set time.rate_hz in place"
+            " of time.column where rows are uniform"
+        )
 
 
 def runs_backwards(time: NDArray) -> bool:
