@@ -19,6 +19,8 @@ REGISTERS = (2.0**16, 2.0**31, 2.0**32)
 """Moduli of counters."""
 LONGEST = 29
 """Greatest length of a stamp in a message: a date to the nanosecond."""
+NANOSECOND = 1e-9
+"""Count of dates, s."""
 DAY_NS = 86_400_000_000_000
 """A day, ns."""
 NEAR = 0.01
@@ -150,7 +152,9 @@ def _written(
     raw: NDArray, column: str, settings: TimeSettings, note: Note, plus: NDArray | None
 ) -> NDArray:
     """Return dates and times of day as nanoseconds."""
-    if plus is not None:
+    # Without its unit said, a number such as 120000 is a time of day that is written so.
+    is_fraction = "plus_unit" in settings.model_fields_set
+    if plus is not None and not is_fraction:
         # A file's typed date ends with a time of its own.
         days = raw.astype("datetime64[D]") if raw.dtype.kind == "M" else raw
         raw = np.array([f"{day} {time}" for day, time in zip(days, plus, strict=True)], object)
@@ -165,8 +169,13 @@ def _written(
         raise InputError(
             f"has {str(raw[0])[:LONGEST]!r}, expected a date{example or ' as in time.format'};"
             f" correct time.column or time.unit in the map{day}"
+            f"{'; if time.plus holds numbers, set time.plus_unit' if plus is not None else ''}"
         )
     stamps = whole(values) if values.dtype.kind in "iu" else values
+    if plus is not None and is_fraction:
+        unit = unit_named(settings.plus_unit)
+        assert unit is not None, "the map checks its units"
+        stamps = stamps + _counts(plus, note) * round(unit.factor / NANOSECOND)
     return _past_midnight(stamps, note)
 
 
