@@ -143,6 +143,15 @@ def test_a_clock_that_was_full_is_reported_and_counted_on_where_the_map_says_so(
     assert_allclose(outcome.recording().frame["time_s"], pendulum.time, atol=1e-9)
 
 
+def test_a_clock_that_begins_again_after_whole_hours_without_a_pause_was_full(
+    imported, pendulum, write_csv
+):
+    path = write_csv(pendulum.columns() | {"time": (35996.0 + pendulum.time) % 36000.0})
+    assert "set time.wraps_at = 36000" in imported(path).printed
+    outcome = imported(path, map_text=MAP.replace("[time]", "[time]\nwraps_at = 36000", 1))
+    assert_allclose(outcome.recording().frame["time_s"], pendulum.time, atol=1e-9)
+
+
 @pytest.mark.parametrize("kind", ["uint32", "uint64", "int32", "int64"])
 def test_a_clock_of_any_width_that_starts_over_steps_back_and_does_not_wrap_round(
     imported, pendulum, tmp_path, kind

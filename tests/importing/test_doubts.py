@@ -308,3 +308,12 @@ def test_a_joint_whose_torque_is_zero_throughout_is_proposed_as_passive(
     assert first["torque"]["column"] == "effort0" and "drive" not in first
     assert second["drive"] == "none" and "torque" not in second
     assert "effort1 is 0 throughout" in doubts["joint[1].drive"]
+
+
+def test_a_clock_that_wraps_around_after_whole_hours_is_proposed_and_unsure(
+    guessed, pendulum, write_csv
+):
+    columns = pendulum.columns() | {"time": (35996.0 + pendulum.time) % 36000.0}
+    text, doubts = guessed(write_csv(columns))
+    assert tomllib.loads(text)["time"]["wraps_at"] == 36000.0
+    assert "time.restarts" in doubts["time.wraps_at"]

@@ -387,7 +387,10 @@ def write_time(proposal: Proposal, guess: TimeGuess, held: Sequence[str]) -> Non
         proposal.key("scale", guess.scale, "as of the unit", guess.unit_sure)
     # Times of day go on after midnight by themselves.
     if guess.wraps_at and guess.unit != "iso8601":
-        proposal.key("wraps_at", guess.wraps_at, "goes back where such a counter is full")
+        usual = clock.is_usual_modulus(guess.wraps_at, guess.count_s)
+        why = "goes back where such a counter is full"
+        why += "" if usual else "; else remove it, and choose time.restarts"
+        proposal.key("wraps_at", guess.wraps_at, why, usual)
     elif guess.restarts and not guess.wraps_at:
         why = 'the clock starts over; "split" makes a recording of each run'
         proposal.key("restarts", "longest", why, sure=False)

@@ -23,6 +23,8 @@ NANOSECOND = 1e-9
 """Count of dates, s."""
 DAY_NS = 86_400_000_000_000
 """A day, ns."""
+HOUR_S = 3600.0
+"""An hour, s."""
 NEAR = 0.01
 """Distance from its modulus, as a share, within which a counter is full."""
 SLOWEST_HZ, FASTEST_HZ = 10.0, 1e4
@@ -413,16 +415,31 @@ def full_clock(before: float, after: float, step: float, count_s: float) -> floa
     Returns
     -------
     float or None
-        Counts; None where neither a register's width fits nor a day.
+        Counts; None where neither a register's width fits nor whole hours.
     """
     near = [limit for limit in REGISTERS if (1.0 - NEAR) * limit < before < limit]
     # A counter with a sign continues at its lowest number, below zero.
     moduli = [2.0 * near[0] if after < 0.0 else near[0]] if near else []
-    # A clock of the day begins again at midnight, without a pause.
-    day = float(f"{1e-9 * DAY_NS / count_s:.12g}")
-    if 0.0 < after + day - before <= 20.0 * step:
-        moduli.append(day)
+    # A clock of the day begins again at midnight, without a pause; others after 1, 10 or 12 hours.
+    hours = np.round(before * count_s / HOUR_S)
+    whole_hours = float(f"{hours * HOUR_S / count_s:.12g}")
+    if hours >= 1.0 and 0.0 < after + whole_hours - before <= 20.0 * step:
+        moduli.append(whole_hours)
     return moduli[0] if moduli else None
+
+
+def is_usual_modulus(modulus: float, count_s: float) -> bool:
+    """Return whether a clock wraps around as registers or clocks of the day do.
+
+    Parameters
+    ----------
+    modulus : float
+        Reading at which it wraps around, in counts.
+    count_s : float
+        Duration of a count, s.
+    """
+    day = float(f"{1e-9 * DAY_NS / count_s:.12g}")
+    return modulus in (*REGISTERS, *(2.0 * one for one in REGISTERS), day)
 
 
 def _if_full(before: float, after: float, step: float, count_s: float) -> str:
