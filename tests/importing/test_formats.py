@@ -392,3 +392,15 @@ def test_records_of_hdf5_may_have_text_and_records_of_several_joints(imported, p
     frame = imported(path, map_text=map_text).recording().frame
     assert_allclose(frame["pivot_angle_rad"], pendulum.angle, atol=1e-9)
     assert_allclose(frame["pivot_torque_nm"], pendulum.torque, atol=1e-5)
+
+
+def test_an_archive_of_numpy_is_read_without_its_python_objects(imported, pendulum, tmp_path):
+    """They could run a program; a table of settings next to the signals is no reason to refuse."""
+    path, objects = tmp_path / "log.npz", np.array([{"robot": "arm"}], dtype=object)
+    np.savez(path, **pendulum.columns(), settings=objects)
+    outcome = imported(path)
+    assert_allclose(outcome.recording().frame["pivot_angle_rad"], pendulum.angle)
+    np.savez(path, log=objects)
+    outcome = imported(path)
+    assert (outcome.code, outcome.err.count("\n")) == (2, 1)
+    assert "holds Python objects in log" in outcome.err
