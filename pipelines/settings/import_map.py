@@ -84,7 +84,9 @@ class TimeSettings(Settings):
     plus: str | None = Field(
         None, description="Column that is added: fractions of a second, or the time of a date."
     )
-    plus_unit: str = Field("ns", description="Unit of `plus`, if it has numbers; of dates it must be given.")
+    plus_unit: str = Field(
+        "ns", description="Unit of `plus`, if it has numbers; of dates it must be given."
+    )
     wraps_at: Positive | None = Field(
         None, description="Reading at which the clock wraps around to 0, such as 4294967296."
     )
