@@ -82,9 +82,11 @@ class TimeSettings(Settings):
         None, description='How dates are written, such as "%d/%m/%Y %I:%M:%S.%f %p".'
     )
     plus: str | None = Field(
-        None, description="Column that is added: nanoseconds of a second, or the time of a date."
+        None, description="Column that is added: fractions of a second, or the time of a date."
     )
-    plus_unit: str = Field("ns", description="Unit of `plus`, if it has numbers.")
+    plus_unit: str = Field(
+        "ns", description="Unit of `plus`, if it has numbers; of dates it must be given."
+    )
     wraps_at: Positive | None = Field(
         None, description="Reading at which the clock wraps around to 0, such as 4294967296."
     )

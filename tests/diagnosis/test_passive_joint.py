@@ -1,8 +1,10 @@
 """A verdict on an arm whose elbow has no drive: what is missing shows in its balance."""
 
+import numpy as np
 import pytest
 
 from pipelines.contracts.joints import Joint
+from pipelines.diagnosis.candidates.smooth_laws import Spans, smooth_laws
 from pipelines.diagnosis.diagnose import diagnose
 from pipelines.diagnosis.verdict.candidate_table import candidates
 from pipelines.diagnosis.verdict.verdict import verdict
@@ -16,6 +18,7 @@ from pipelines.effects.torque_offset import TorqueOffset
 from pipelines.mechanics.geometry import Geometry
 from pipelines.mechanics.machine import machine_of
 from tests.diagnosis.free_elbow import free_elbow, motion_of
+from tests.diagnosis.screening import Screening
 
 
 def runs(**hidden):
@@ -49,3 +52,13 @@ def test_a_passive_joint_has_no_effect_of_a_torque_sensor_and_an_endless_one_no_
     level = machine_of((Joint("table"),), Geometry(gravity_m_s2=0.0))
     differ = {effect for effect in EFFECTS if effect.possible(table) != effect.possible(level)}
     assert differ == {ParallelSpring, EndStop, PositionDependentFriction, PassiveJointTorque}
+
+
+def test_no_law_of_a_load_is_sought_at_a_joint_without_a_drive():
+    """What is predicted there is the residual: a gain on it would explain all of that."""
+    prepared = Screening.of(runs()).prepared
+    spans = Spans.of(prepared.runs, prepared.torque[:2])
+    run = prepared.runs[0]
+    laws, _ = smooth_laws(run, spans, np.ones_like(run.state[0]))
+    of_load = {(law.kind, law.joint) for law in laws if "load" in law.kind or "gain" in law.kind}
+    assert of_load == {("load", 0), ("gain_over_time", 0), ("other_load", 1)}

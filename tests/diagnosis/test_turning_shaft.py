@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from pipelines.diagnosis.data_faults.units import angle_unit_faults
 from pipelines.diagnosis.diagnose import diagnose
 from pipelines.diagnosis.verdict.verdict import verdict
 from pipelines.mechanics.kinematics import motion_table
@@ -38,3 +39,7 @@ def test_the_ripple_of_a_shaft_is_found_over_all_its_turns():
     found = {parameter["name"]: parameter["value"] for parameter in cause["parameters"]}
     assert found["cycles_per_turn"] == pytest.approx(12.0, abs=0.01)
     assert found["amplitude"] == pytest.approx(0.02, rel=0.05)
+
+
+def test_many_turns_of_a_joint_that_turns_without_end_are_no_wrong_unit():
+    assert not [fault for seed in (1, 3) for fault in angle_unit_faults(shaft("train", seed))]

@@ -143,6 +143,15 @@ def test_a_clock_that_was_full_is_reported_and_counted_on_where_the_map_says_so(
     assert_allclose(outcome.recording().frame["time_s"], pendulum.time, atol=1e-9)
 
 
+def test_a_clock_that_begins_again_after_whole_hours_without_a_pause_was_full(
+    imported, pendulum, write_csv
+):
+    path = write_csv(pendulum.columns() | {"time": (35996.0 + pendulum.time) % 36000.0})
+    assert "set time.wraps_at = 36000" in imported(path).printed
+    outcome = imported(path, map_text=MAP.replace("[time]", "[time]\nwraps_at = 36000", 1))
+    assert_allclose(outcome.recording().frame["time_s"], pendulum.time, atol=1e-9)
+
+
 @pytest.mark.parametrize("kind", ["uint32", "uint64", "int32", "int64"])
 def test_a_clock_of_any_width_that_starts_over_steps_back_and_does_not_wrap_round(
     imported, pendulum, tmp_path, kind
@@ -309,3 +318,12 @@ def test_dates_with_the_day_first_are_read_and_what_is_none_is_refused_by_what_i
     )
     assert (american.code, american.err.count("\n")) == (2, 1)
     assert "has '03/05/24 11.59', expected a date such as 2026-01-31" in american.err
+
+
+def test_fractions_without_leading_zeros_are_refused_as_that(imported, pendulum, write_csv):
+    """As ``printf("%d.%d")`` writes seconds and microseconds."""
+    microseconds = np.round(1e6 * pendulum.time).astype(int)
+    stamps = [f"{t // 10**6}.{t % 10**6}" for t in microseconds]
+    outcome = imported(write_csv(pendulum.columns() | {"time": stamps}))
+    assert outcome.code == 2
+    assert "without their leading zeros" in outcome.err and "time.rate_hz" in outcome.err

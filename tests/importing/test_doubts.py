@@ -232,3 +232,88 @@ def test_an_angle_that_is_blank_where_the_torque_is_logged_is_interpolated(
     assert len(frame) > 650
     truth = pendulum.angle[1::2][: len(frame)]
     assert_allclose(frame["joint_angle_rad"], truth, atol=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("angle", "torque"),
+    [
+        ("Position [0.01 deg]", "Torque [0.1 Nm]"),
+        ("Position [deg/100]", "Torque [Nm/10]"),
+        ("Position_deg_x100", "Torque_Nm_x10"),
+        ("Position [1e-2 deg]", "Torque [dNm]"),
+        ("Position_cdeg", "Torque_dNm"),
+    ],
+)
+def test_a_unit_with_a_factor_or_a_prefix_is_not_read_as_the_unit_alone(
+    guessed, pendulum, write_csv, angle, torque
+):
+    columns = {"time": pendulum.time, angle: 100.0 * np.degrees(pendulum.angle)}
+    _, doubts = guessed(write_csv(columns | {torque: 10.0 * pendulum.torque}))
+    assert {"joint[0].angle.unit", "joint[0].torque.unit"} <= doubts.keys()
+
+
+def test_a_factor_in_a_name_is_given_with_the_keys_to_set(guessed, pendulum, write_csv):
+    columns = {
+        "Time [0.1 ms]": np.round(1e4 * pendulum.time).astype(int),
+        "Position [deg]": np.degrees(pendulum.angle),
+        "Torque [0.1 Nm]": 10.0 * pendulum.torque,
+    }
+    _, doubts = guessed(write_csv(columns))
+    assert "its name says '0.1 ms': set unit and scale" in doubts["time.unit"]
+    assert "its name says '0.1 Nm': set unit and scale" in doubts["joint[0].torque.unit"]
+
+
+def test_a_channel_with_values_in_the_rows_of_a_clock_has_that_clock(guessed, pendulum, write_csv):
+    """Two devices in one table, the slower one with fewer rows."""
+    slow = len(pendulum.time) // 4
+
+    def ended(values):
+        return [*map(str, values[::4]), *[""] * (len(values) - slow)]
+
+    columns = {
+        "enc_time_s": ended(pendulum.time),
+        "enc_angle_rad": ended(pendulum.angle),
+        "daq_time_s": pendulum.time,
+        "daq_torque_Nm": pendulum.torque,
+    }
+    text, doubts = guessed(write_csv(columns))
+    (joint,) = tomllib.loads(text)["joint"]
+    assert joint["angle"]["time"] == "enc_time_s"
+    assert "time_offset_s" in doubts["time.column"]
+
+
+def test_the_sign_of_a_torque_is_unsure_where_its_column_is(guessed, pendulum, write_csv):
+    """Without names, another joint's motion explains a torque with the opposite sign, too."""
+    columns = {
+        "a": pendulum.time,
+        "b": pendulum.angle,
+        "c": pendulum.velocity,
+        "d": -pendulum.torque,
+    }
+    text, doubts = guessed(write_csv(columns))
+    assert tomllib.loads(text)["joint"][0]["torque"]["sign"] == -1
+    assert {"joint[0].torque.column", "joint[0].torque.sign"} <= doubts.keys()
+
+
+def test_a_joint_whose_torque_is_zero_throughout_is_proposed_as_passive(
+    guessed, pendulum, write_csv
+):
+    """As ROS writes the effort of a joint without a drive."""
+    columns = {"time": pendulum.time}
+    for k in (0, 1):
+        columns[f"position{k}"] = np.roll(pendulum.angle, 200 * k)
+        columns[f"effort{k}"] = (1 - k) * pendulum.torque
+    text, doubts = guessed(write_csv(columns))
+    first, second = tomllib.loads(text)["joint"]
+    assert first["torque"]["column"] == "effort0" and "drive" not in first
+    assert second["drive"] == "none" and "torque" not in second
+    assert "effort1 is 0 throughout" in doubts["joint[1].drive"]
+
+
+def test_a_clock_that_wraps_around_after_whole_hours_is_proposed_and_unsure(
+    guessed, pendulum, write_csv
+):
+    columns = pendulum.columns() | {"time": (35996.0 + pendulum.time) % 36000.0}
+    text, doubts = guessed(write_csv(columns))
+    assert tomllib.loads(text)["time"]["wraps_at"] == 36000.0
+    assert "time.restarts" in doubts["time.wraps_at"]

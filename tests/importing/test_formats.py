@@ -372,3 +372,35 @@ def test_a_guess_takes_durations_of_parquet_for_ns_whatever_their_name_says(
     )
     frame = imported(path, map_text=text).recording("log_train").frame
     assert_allclose(frame["time_s"], pendulum.time[: len(frame)], atol=1e-9)
+
+
+def test_records_of_hdf5_may_have_text_and_records_of_several_joints(imported, pendulum, tmp_path):
+    """Samples along the first axis, each with a state in words and a part for each joint."""
+    h5py = pytest.importorskip("h5py")
+    part = [("pos", "f8"), ("trq", "f4")]
+    records = np.zeros(len(pendulum.time), [("t", "f8"), ("axis", part, (2,)), ("mode", "S8")])
+    records["t"], records["mode"] = pendulum.time, b"OP"
+    records["axis"]["pos"][:, 1] = pendulum.angle
+    records["axis"]["trq"][:, 1] = pendulum.torque
+    path = tmp_path / "log.h5"
+    with h5py.File(path, "w") as file:
+        file["run/samples"] = records
+    map_text = MAP.replace('"time"', '"run/samples.t"', 1)
+    map_text = map_text.replace('"angle"', '"run/samples.axis.pos[1]"')
+    map_text = map_text.replace('"torque"', '"run/samples.axis.trq[1]"')
+    map_text = "\n".join(line for line in map_text.splitlines() if "velocity" not in line)
+    frame = imported(path, map_text=map_text).recording().frame
+    assert_allclose(frame["pivot_angle_rad"], pendulum.angle, atol=1e-9)
+    assert_allclose(frame["pivot_torque_nm"], pendulum.torque, atol=1e-5)
+
+
+def test_an_archive_of_numpy_is_read_without_its_python_objects(imported, pendulum, tmp_path):
+    """They could run a program; a table of settings next to the signals is no reason to refuse."""
+    path, objects = tmp_path / "log.npz", np.array([{"robot": "arm"}], dtype=object)
+    np.savez(path, **pendulum.columns(), settings=objects)
+    outcome = imported(path)
+    assert_allclose(outcome.recording().frame["pivot_angle_rad"], pendulum.angle)
+    np.savez(path, log=objects)
+    outcome = imported(path)
+    assert (outcome.code, outcome.err.count("\n")) == (2, 1)
+    assert "holds Python objects in log" in outcome.err

@@ -119,6 +119,20 @@ def test_a_date_and_its_time_of_day_in_two_columns_are_one_clock(imported, pendu
     assert_allclose(outcome.recording().frame["time_s"], pendulum.time, atol=1e-9)
 
 
+def test_a_time_of_day_and_its_milliseconds_in_two_columns_are_one_clock(
+    imported, pendulum, write_csv
+):
+    """As FactoryTalk writes them; the unit of the second column must be given."""
+    stamps = pd.Timestamp("2026-03-04 23:59:57") + pd.to_timedelta(pendulum.time, unit="s")
+    columns = {"time": stamps.strftime("%H:%M:%S"), "milli": stamps.microsecond // 1000}
+    path = write_csv(pendulum.columns() | columns)
+    without = imported(path, map_text=with_clock('unit = "iso8601"\nplus = "milli"'))
+    assert without.code == 2 and "time.plus_unit" in without.err
+    text = with_clock('unit = "iso8601"\nplus = "milli"\nplus_unit = "ms"')
+    frame = imported(path, map_text=text).recording().frame
+    assert_allclose(frame["time_s"], pendulum.time, atol=1e-9)
+
+
 @pytest.mark.parametrize(
     ("one", "other", "step_s"),
     [

@@ -206,13 +206,17 @@ def _laws_of(run: Run, spans: Spans, load: NDArray, j: int) -> Iterator[tuple[st
     yield from _scaled("friction_by_angle", q[j], range(1, 4), here)
     yield from _scaled("inertia_by_angle", q[j], range(3), a[:, j])
     root = np.sqrt(np.abs(force))
-    # The first two are friction that grows with the load. The others are a gain that depends on the
-    # load's sign or size.
-    for column in (np.abs(force) * way, root * way, np.abs(force), force * np.abs(force)):
-        yield "load", 1, column
+    joints = run.motion.machine.joints
+    # A passive joint carries no load: what is predicted there is the residual itself, and a gain on
+    # it would explain all of that.
+    if not joints[j].is_passive:
+        # The first two are friction that grows with the load. The others are a gain that depends on
+        # the load's sign or size.
+        for column in (np.abs(force) * way, root * way, np.abs(force), force * np.abs(force)):
+            yield "load", 1, column
     # Half waves over the longest run: the slowest change is a single rise or fall.
     phase = np.pi * (run.time - run.time[0]) / spans.duration_s
-    for k in range(4):
+    for k in range(0 if joints[j].is_passive else 4):
         yield "gain_over_time", k, force * np.cos(k * phase)
     for k in range(1, 4):
         yield "friction_over_time", k, way * np.cos(k * phase)
@@ -231,8 +235,9 @@ def _laws_of(run: Run, spans: Spans, load: NDArray, j: int) -> Iterator[tuple[st
         other, other_way = v[:, o], sign[:, o]
         for column in (other_way, other, np.abs(other), other * np.abs(other), here * other):
             yield "other_speed", 1, column
-        yield "other_load", 1, tau[:, o]
-        yield "other_load", 1, np.abs(tau[:, o]) * way
+        if not joints[o].is_passive:
+            yield "other_load", 1, tau[:, o]
+            yield "other_load", 1, np.abs(tau[:, o]) * way
         yield from _scaled("friction_by_other_angle", q[o], range(1, 4), way)
         yield from _scaled("friction_by_other_angle", q[o], range(1, 3), here)
         yield "inertia_by_angle", 2, a[:, o]

@@ -73,6 +73,7 @@ def angle_unit_faults(motion: Motion) -> Iterator[Fault]:
         elif (
             len(q)
             and motion.machine.joints[j].kind == "revolute"
+            and not motion.machine.joints[j].turns
             and np.abs(q).max() > LARGEST_ANGLE_RAD
         ):
             factor, times = float(np.degrees(1.0)), None

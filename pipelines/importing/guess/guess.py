@@ -61,7 +61,8 @@ def propose(paths: Sequence[Path]) -> Proposal:
             raise InputError(_no_clock(names, columns))
     for path in paths[1:]:
         _check_columns(path, source, join)
-    clocks = _onto_one_clock(source, time.column, columns)
+    of_columns = _of_the_same_rows(time, columns) | dict(source.clocks)
+    clocks = _onto_one_clock(of_columns, time.column, columns)
     clocks |= _into_blank_rows(names, time.column, columns)
     columns[time.column] = time.stamps(*(columns[name] for name in time.columns))
     # Within one run, because integrals and fits across a restart of the clock mean nothing.
@@ -104,7 +105,9 @@ def propose(paths: Sequence[Path]) -> Proposal:
     if not time.unit_sure and any("velocity" in joint.columns for joint in joints):
         proposal.doubt("joint.velocity.unit", "follows from the unit of time, which is unsure")
     _write_geometry(proposal, joints)
-    _write_recordings(proposal, paths, [_period(path, join, time, joints) for path in paths])
+    _write_recordings(
+        proposal, paths, [_period(path, join, time, joints, of_columns) for path in paths]
+    )
     _write_unused(proposal, [name for name in source.names if name not in used], columns)
     return proposal
 
@@ -171,13 +174,33 @@ def _without_blanks(values: NDArray) -> NDArray:
     return values[np.isfinite(values)] if values.dtype.kind == "f" else values
 
 
-def _onto_one_clock(source: Source, column: str, columns: Columns) -> dict[str, str]:
+def _of_the_same_rows(time: TimeGuess, columns: Columns) -> dict[str, str]:
+    """Return the clock of each column that has values where another clock has stamps, only."""
+
+    def rows_of(name: str) -> NDArray:
+        values = columns[name]
+        return np.isfinite(values) if values.dtype.kind == "f" else np.ones(len(values), bool)
+
+    owners: dict[str, str] = {}
+    for rival in time.rivals:
+        rows = rows_of(rival)
+        if np.array_equal(rows, rows_of(time.column)):
+            continue
+        owners |= {
+            name: rival
+            for name in columns
+            if name not in (rival, time.column) and np.array_equal(rows_of(name), rows)
+        }
+    return owners
+
+
+def _onto_one_clock(clocks: Mapping[str, str], column: str, columns: Columns) -> dict[str, str]:
     """Interpolate columns with a clock of their own, and return that clock by column."""
     own: dict[str, str] = {}
     if columns[column].dtype.kind not in "iuf":
         return own
     stamps = columns[column].astype(float)
-    for name, clock_name in source.clocks.items():
+    for name, clock_name in clocks.items():
         if name not in columns:
             continue
         at, values = columns[clock_name], columns[name]
@@ -275,7 +298,11 @@ def _write_geometry(proposal: Proposal, joints: Sequence[JointColumns]) -> None:
 
 
 def _period(
-    path: Path, join: Join | None, time: TimeGuess, joints: Sequence[JointColumns]
+    path: Path,
+    join: Join | None,
+    time: TimeGuess,
+    joints: Sequence[JointColumns],
+    clocks: Mapping[str, str],
 ) -> float | None:
     """Return the period of the motion in a file, s; of its set-points where these were logged."""
     names = {
@@ -283,9 +310,9 @@ def _period(
     }
     with about(path):
         source = opened(path, join)
-        own = [source.clocks[name] for name in names if name in source.clocks]
+        own = [clocks[name] for name in names if name in clocks]
         columns = source.load([*time.columns, *names, *own])
-    _onto_one_clock(source, time.column, columns)
+    _onto_one_clock(clocks, time.column, columns)
     motion = {name: _numeric(columns[name]) for name in names}
     logged = (columns[name] for name in time.columns)
     as_numbers = whole_nanoseconds if time.unit == "iso8601" else _numeric

@@ -134,6 +134,10 @@ class _JointWriter:
         if self.too_far:
             why = f"{self.turns:.4g} turns; remove it if another unit or gear_ratio is right"
             self.proposal.key("turns", True, why, sure=False)
+        if self.joint.zero_torque:
+            self.used.append(self.joint.zero_torque)
+            why = f"{self.joint.zero_torque} is 0 throughout, as of a passive joint"
+            self.proposal.key("drive", "none", why, sure=False)
         if self.joint.enabled:
             self.used.append(self.joint.enabled)
             self.proposal.key("enabled", self.joint.enabled, _when_off(columns[self.joint.enabled]))
@@ -148,7 +152,7 @@ class _JointWriter:
         if self.too_far:
             why += f"; {self.turns:.4g} turns, so check unit and gear_ratio"
             sure = False
-        self.proposal.key("unit", self.units.angle, why, sure)
+        self.proposal.key("unit", self.units.angle, why + self._unread("angle", "; "), sure)
         if self.units.angle == "counts":
             counts = self.units.counts_in_turn
             self._write_counts(f"; by the velocity {counts:.4g} in its turn" if counts else "")
@@ -161,7 +165,8 @@ class _JointWriter:
         """Write the table of the velocity."""
         self._write_column("velocity")
         units = self.units
-        self.proposal.key("unit", units.velocity, units.velocity_why, units.velocity_sure)
+        why = units.velocity_why + ("" if units.velocity_sure else self._unread("velocity", "; "))
+        self.proposal.key("unit", units.velocity, why, units.velocity_sure)
         if UNITS[units.velocity].dimension == "counts per second":
             self._write_counts()
         if units.velocity_sign < 0:
@@ -173,6 +178,8 @@ class _JointWriter:
     def write_torque(self, fit: TorqueFit | None) -> None:
         """Write the table of torque or force."""
         drive = self.joint.drive
+        if self.joint.zero_torque:
+            return
         if drive is None:
             self.proposal.table("[joint.torque]", f"{self.where}.torque")
             self.proposal.unknown("column", "no column is named torque, current or voltage")
@@ -203,7 +210,8 @@ class _JointWriter:
                 self.proposal.key("unit", unit, FROM_NAME)
             else:
                 unit = usual
-                self.proposal.key("unit", unit, "as is usual", sure=False)
+                why = f"as is usual{self._unread(quantity, '; ')}"
+                self.proposal.key("unit", unit, why, sure=False)
             if unit == "counts":
                 self._write_counts()
             # Set-points are in the counts and turns of the drive's own encoder.
@@ -330,7 +338,7 @@ class _JointWriter:
                 why = "whole numbers, as drives log mA"
                 self.proposal.key("unit", "mA", why, sure=False)
             else:
-                self.proposal.key("unit", "A", "no name has its unit; SI assumed", sure=False)
+                self.proposal.key("unit", "A", self._assumed(drive), sure=False)
             self._write_motor_constant()
             self._write_gear(ratio=self.units.gear)
         elif dimension == "force" and not self.slides:
@@ -355,29 +363,45 @@ class _JointWriter:
     def _unit_of_torque(self, named: str | None, values: NDArray) -> tuple[str, str, bool]:
         """Return the unit of a torque or force, why, and whether a drive can be that strong."""
         quantity, si = ("force", "N") if self.slides else ("torque", "N·m")
-        unit, why = (named, FROM_NAME) if named else (si, "no name has its unit; SI assumed")
+        drive = self.joint.drive or quantity
+        unit, why = (named, FROM_NAME) if named else (si, self._assumed(drive))
         # A quantile, so that an outlier does not change the unit.
         reach = float(np.nanquantile(np.abs(values), 0.99)) * UNITS[unit].factor
         if reach <= STRONGEST[quantity]:
             return unit, why, named is not None
         return unit, f"{why}, but {reach:.4g} {si} is too much for a drive: is it m{si}?", False
 
+    def _assumed(self, quantity: str) -> str:
+        """Return why a unit is SI where it is not read off the name."""
+        return self._unread(quantity) or "no name has its unit; SI assumed"
+
+    def _unread(self, quantity: str, before: str = "") -> str:
+        """Return what to set for a unit in a column's name that is not read; empty without one."""
+        text = self.joint.columns[quantity].unread
+        return f"{before}its name says {text!r}: set unit and scale by that" if text else ""
+
     def _write_torque_sign(self, fit: TorqueFit | None) -> None:
+        sign, sure = 1, False
         if fit is None:
             why = "positive torque must accelerate the angle upward; not visible in this log"
-            self.proposal.key("sign", 1, why, sure=False)
         elif not fit.proves:
             why = f"the motion explains {max(0.0, fit.explained):.0%} of the torque"
             why += f", and {max(0.0, fit.rival):.0%} of one shifted in time"
-            self.proposal.key("sign", 1, why, sure=False)
         elif fit.backwards:
+            sign, sure = -1, True
             why = "reversed, it accelerates the joint and overcomes its friction"
-            self.proposal.key("sign", -1, f"{why} ({fit.explained:.0%} fits)")
+            why += f" ({fit.explained:.0%} fits)"
         elif fit.inertia > 0.0 and fit.friction > 0.0:
+            sure = True
             why = "accelerates the joint and overcomes its friction"
-            self.proposal.key("sign", 1, f"{why} ({fit.explained:.0%} fits)")
+            why += f" ({fit.explained:.0%} fits)"
         else:
-            self.proposal.key("sign", 1, "inertia and friction disagree about it", sure=False)
+            why = "inertia and friction disagree about it"
+        # The motion of another joint explains a torque, too, often with the opposite sign.
+        if sure and self.joint.drive in self.joint.doubtful:
+            sure = False
+            why += ", if this is the joint's torque"
+        self.proposal.key("sign", sign, why, sure)
 
 
 def _when_off(switch: NDArray) -> str:

@@ -30,6 +30,8 @@ class JointColumns:
     """Quantities whose column may be another one."""
     enabled: str | None = None
     """Column that is 1 while its drive is on, else 0."""
+    zero_torque: str | None = None
+    """Column of a torque or current that is 0 throughout, where it has no other."""
 
     @property
     def drive(self) -> str | None:
@@ -95,6 +97,14 @@ def group_joints(
         )
         for number, (name, members) in enumerate(by_joint.items(), 1)
     ]
+    zeros = [m for m in meanings if m.quantity in TURNING and _is_zero(columns[m.column], rows)]
+    owners = {_owner(m, by_joint): m.column for m in zeros if not m.commanded}
+    # A log whose drives are all silent shows no passive joint.
+    if any(joint.drive for joint in joints):
+        joints = [
+            joint if joint.drive else replace(joint, zero_torque=owners.get(name))
+            for name, joint in zip(by_joint, joints, strict=True)
+        ]
     # A stable sort: joints without a place in a limb keep the order of their columns.
     return sorted(joints if named else map(_with_reason_of_counts, joints), key=_place)
 
@@ -196,6 +206,14 @@ def _moves(values: NDArray, rows: int) -> bool:
     if not len(known) or np.ptp(known) == 0.0:
         return False
     return not np.all(np.diff(known) == 1.0)
+
+
+def _is_zero(values: NDArray, rows: int) -> bool:
+    """Return whether a column has numbers, and no other than 0."""
+    if values.dtype.kind not in "iuf" or len(values) != rows:
+        return False
+    known = values[np.isfinite(values)]
+    return bool(len(known)) and not known.any()
 
 
 def _joint(key: str, members: Sequence[Meaning], number: int, joints: int) -> JointColumns:

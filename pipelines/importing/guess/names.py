@@ -105,6 +105,8 @@ class Meaning:
     commanded: bool
     filtered: bool
     measured: bool
+    unread: str = ""
+    """Text of a unit in the name that is not read, such as ``0.1 Nm``."""
 
     @property
     def rank(self) -> int:
@@ -126,7 +128,9 @@ def meaning(name: str) -> Meaning:
         quantity = _quantity(set(words))
     distinct = set(words) - _containers(plain)
     unit = None
-    if in_name:
+    if in_name and in_name.unread:
+        quantity = quantity or in_name.quantity
+    elif in_name:
         unit = in_name.unit
         # A unit that no map has overrides the words: torque in N·m/s is the rate of a torque.
         quantity = in_name.quantity or (quantity if unit else "")
@@ -152,6 +156,7 @@ def meaning(name: str) -> Meaning:
         commanded,
         filtered=bool(distinct & FILTERED),
         measured=bool(distinct & MEASURED),
+        unread=in_name.unread if in_name else "",
     )
 
 

@@ -120,7 +120,9 @@ def guess_time(
     for meaning in sorted(candidates, key=lambda m: m.unit is None):
         guess = _guess(meaning, columns[meaning.column].astype(float), meaning in coarse, typed)
         if guess is not None:
-            clocks = [(m.column, _unit(m, typed) or guess.unit) for m in named + coarse]
+            # A slower clock of a table ends before the others, or is blank in rows between.
+            partial = [m for m in meanings if m not in named and _advances_in_its_rows(m, columns)]
+            clocks = [(m.column, _unit(m, typed) or guess.unit) for m in named + coarse + partial]
             return replace(guess, rivals=tuple(_rivals(guess, clocks, columns)))
     return None
 
@@ -210,6 +212,8 @@ def _guess(
             )
     if not is_named:
         why += "; no name shows which column is the time"
+    if meaning.unread:
+        why += f"; its name says {meaning.unread!r}: set unit and scale by that"
     if not is_usual:
         usual = clock.usual_units(step)
         why += f", no usual rate: is it {' or '.join(usual) or 'another column'}?"
@@ -222,6 +226,7 @@ def _guess(
         unit_sure=is_named
         and is_usual
         and not others
+        and not meaning.unread
         and (unit not in LONG or bool(known or epoch)),
         wraps_at=wraps_at,
         restarts=restarts,
@@ -372,6 +377,7 @@ def write_time(proposal: Proposal, guess: TimeGuess, held: Sequence[str]) -> Non
         why += ", as no other does"
     if guess.rivals:
         why += f", and so does {' and '.join(guess.rivals)}: name it as `time` of its channels"
+        why += ", with time_offset_s if they did not begin together"
     proposal.key("column", guess.column, why, guess.sure and not guess.rivals)
     proposal.key("unit", guess.unit, guess.why, guess.unit_sure)
     if guess.plus is not None:
@@ -381,7 +387,10 @@ def write_time(proposal: Proposal, guess: TimeGuess, held: Sequence[str]) -> Non
         proposal.key("scale", guess.scale, "as of the unit", guess.unit_sure)
     # Times of day go on after midnight by themselves.
     if guess.wraps_at and guess.unit != "iso8601":
-        proposal.key("wraps_at", guess.wraps_at, "goes back where such a counter is full")
+        usual = clock.is_usual_modulus(guess.wraps_at, guess.count_s)
+        why = "goes back where such a counter is full"
+        why += "" if usual else "; else remove it, and choose time.restarts"
+        proposal.key("wraps_at", guess.wraps_at, why, usual)
     elif guess.restarts and not guess.wraps_at:
         why = 'the clock starts over; "split" makes a recording of each run'
         proposal.key("restarts", "longest", why, sure=False)
@@ -395,6 +404,15 @@ def _advances(values: NDArray, is_named: bool) -> bool:
     if np.all(steps == 1.0) and not is_named:
         return False
     return bool(np.mean(steps > 0) > ADVANCES)
+
+
+def _advances_in_its_rows(meaning: Meaning, columns: Mapping[str, NDArray]) -> bool:
+    """Return whether a column that is named a clock is one, but for rows without a stamp."""
+    values = columns[meaning.column]
+    if meaning.quantity != "time" or values.dtype.kind != "f":
+        return False
+    known = np.isfinite(values)
+    return not known.all() and _advances(values[known], is_named=True)
 
 
 def _stands_still(values: NDArray) -> bool:

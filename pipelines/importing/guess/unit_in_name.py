@@ -31,6 +31,8 @@ OTHERS = (
 )
 """Units of quantities that no map has."""
 BRACKETS = re.compile(r"[\[({<]([^\])}>]*)[\])}>]")
+FACTOR = re.compile(r"(?<![^\W_])[x×*/] ?10+(?![\d.])|(?<!\d)10 ?\^ ?-?\d+|\d*\.\d+(?= ?[^\W\d_])")
+"""A factor next to a unit outside of brackets: ``x10``, ``/100``, ``10^-3``, ``0.1 Nm``."""
 
 
 @dataclass(frozen=True)
@@ -39,9 +41,11 @@ class UnitInName:
 
     rest: str
     unit: str | None
-    """None for a unit of a quantity that no map has."""
+    """None for a unit of a quantity that no map has; without its factor where it is unread."""
     decides: bool
     """Whether it determines the quantity; a letter or a word may mean something else."""
+    unread: str = ""
+    """Text of a unit that no map has, or of one with a factor: ``0.1 Nm``."""
 
     @property
     def quantity(self) -> str:
@@ -55,8 +59,30 @@ def unit_in(name: str) -> UnitInName | None:
     for bracket in BRACKETS.finditer(name):
         text = bracket[1].strip()
         unit = None if text in OTHERS else _written(text)
-        if unit or text in OTHERS:
+        if (unit or text in OTHERS) and not FACTOR.search(_without(name, bracket)):
             return UnitInName(_without(name, bracket), unit, decides=True)
+    return _with_factor(name) or _outside_of_brackets(name)
+
+
+def _with_factor(name: str) -> UnitInName | None:
+    """Return a unit that no map has, as it is a product or has a factor."""
+    for bracket in BRACKETS.finditer(name):
+        text = bracket[1].strip()
+        known = text in OTHERS or _written(text)
+        has_factor = re.search(r"\d", text) and (_WORD.search(text) or "%" in text)
+        is_product = re.search(r"[^\W\d_]\s*[*·/^]\s*\w", text)
+        if not known and (has_factor or is_product):
+            of = None if is_product else _WORD.search(text)
+            return UnitInName(_without(name, bracket), _written(of[0]) if of else None, True, text)
+    rest = FACTOR.sub(" ", name)
+    unit = _WORD.search(rest)
+    if rest == name or unit is None:
+        return None
+    factor = " ".join(match[0].strip() for match in FACTOR.finditer(name))
+    return UnitInName(_without(rest, unit), _written(unit[0]), True, f"{factor} with {unit[0]}")
+
+
+def _outside_of_brackets(name: str) -> UnitInName | None:
     matches = list(_WORD.finditer(name)) or list(_LETTER.finditer(name))
     if not matches:
         return None
@@ -108,6 +134,9 @@ _ANY = "|".join(
 )
 # Borders of words in snake_case and camelCase alike: torque_Nm, torqueNm. A single letter is a unit
 # only at the end, as in time_s: elsewhere it is a symbol.
-_BEFORE, _AFTER = r"(?:(?<![^\W_])|(?<=[a-z0-9])(?=[A-Z]))", r"(?:(?![^\W\d_])|(?=[A-Z][a-z]))"
+# A prefix makes another unit: dNm and daNm are no Nm, although tauNm and qDeg are in camelCase.
+_NO_PREFIX = r"(?<!(?<![^\W_])[dcmuµμM])(?<!(?<![^\W_])da)"
+_BEFORE = rf"(?:(?<![^\W_])|(?<=[a-z0-9])(?=[A-Z]){_NO_PREFIX})"
+_AFTER = r"(?:(?![^\W\d_])|(?=[A-Z][a-z]))"
 _WORD = re.compile(rf"{_BEFORE}(?i:{_ANY}){_AFTER}")
 _LETTER = re.compile(r"(?<=[^\W_][_\s./,:-])[smAVNKC°%]$")

@@ -81,11 +81,16 @@ def _data_sets(group: Any) -> list[str]:
 
 
 def _is_of_numbers(data: Any) -> bool:
-    kinds = [data.dtype[field] for field in data.dtype.names] if data.dtype.names else [data.dtype]
     matlab = data.attrs.get("MATLAB_class")
-    return all(kind.kind in "biuf" for kind in kinds) and (
-        matlab is None or matlab in MATLAB_CLASSES_OF_NUMBERS
-    )
+    return _has_numbers(data.dtype) and (matlab is None or matlab in MATLAB_CLASSES_OF_NUMBERS)
+
+
+def _has_numbers(kind: np.dtype) -> bool:
+    """Return whether a type, or a part of a record, is of numbers; others make no column."""
+    kind = kind.base
+    if kind.names:
+        return any(_has_numbers(kind[field]) for field in kind.names)
+    return kind.kind in "biuf"
 
 
 def _values(data: Any, sample: bool = False) -> np.ndarray:

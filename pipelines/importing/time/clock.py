@@ -19,8 +19,12 @@ REGISTERS = (2.0**16, 2.0**31, 2.0**32)
 """Moduli of counters."""
 LONGEST = 29
 """Greatest length of a stamp in a message: a date to the nanosecond."""
+NANOSECOND = 1e-9
+"""Count of dates, s."""
 DAY_NS = 86_400_000_000_000
 """A day, ns."""
+HOUR_S = 3600.0
+"""An hour, s."""
 NEAR = 0.01
 """Distance from its modulus, as a share, within which a counter is full."""
 SLOWEST_HZ, FASTEST_HZ = 10.0, 1e4
@@ -150,7 +154,9 @@ def _written(
     raw: NDArray, column: str, settings: TimeSettings, note: Note, plus: NDArray | None
 ) -> NDArray:
     """Return dates and times of day as nanoseconds."""
-    if plus is not None:
+    # Without its unit said, a number such as 120000 is a time of day that is written so.
+    is_fraction = "plus_unit" in settings.model_fields_set
+    if plus is not None and not is_fraction:
         # A file's typed date ends with a time of its own.
         days = raw.astype("datetime64[D]") if raw.dtype.kind == "M" else raw
         raw = np.array([f"{day} {time}" for day, time in zip(days, plus, strict=True)], object)
@@ -165,8 +171,13 @@ def _written(
         raise InputError(
             f"has {str(raw[0])[:LONGEST]!r}, expected a date{example or ' as in time.format'};"
             f" correct time.column or time.unit in the map{day}"
+            f"{'; if time.plus holds numbers, set time.plus_unit' if plus is not None else ''}"
         )
     stamps = whole(values) if values.dtype.kind in "iu" else values
+    if plus is not None and is_fraction:
+        unit = unit_named(settings.plus_unit)
+        assert unit is not None, "the map checks its units"
+        stamps = stamps + _counts(plus, note) * round(unit.factor / NANOSECOND)
     return _past_midnight(stamps, note)
 
 
@@ -293,6 +304,7 @@ def runs(time_s: NDArray, raw: NDArray, count_s: float, note: Note = unnoted) ->
     # Outliers first: one stamp far ahead would look like a clock that starts over after it.
     rows = _without_outliers(rows, time_s, note)
     begins = _begins(time_s[rows])
+    _check_fractions(raw[rows], begins[1:])
     for k in begins[1:]:
         back = time_s[rows[k - 1]] - time_s[rows[k]]
         seen = f"clock starts over at row {rows[k]}, {back:.6g} s back"
@@ -300,6 +312,24 @@ def runs(time_s: NDArray, raw: NDArray, count_s: float, note: Note = unnoted) ->
         note(seen, _if_full(float(raw[rows[k - 1]]), float(raw[rows[k]]), step, count_s))
     parts = [_ordered(part, time_s) for part in np.split(rows, begins[1:])]
     return [run for run in parts if len(run) > 1]
+
+
+def _check_fractions(stamps: NDArray, restarts: Sequence[int]) -> None:
+    """Refuse a clock that starts over again and again, but never leaves its second.
+
+    Seconds and microseconds that were put together without leading zeros do so: 5 ms after 12 s
+    become 12.5000.
+    """
+    # Once or twice a clock may be set back within a second by chance.
+    by_chance = 2
+    whole = np.floor(stamps.astype(float))
+    at = np.asarray(restarts, dtype=int)
+    if len(at) > by_chance and np.all(whole[at] == whole[at - 1]) and np.all(np.diff(whole) >= 0.0):
+        raise InputError(
+            f"its clock goes back {len(at)} times, but its whole part never does: fractions are"
+            " written without their leading zeros. Correct the stamps, or set time.rate_hz in place"
+            " of time.column where rows are uniform"
+        )
 
 
 def runs_backwards(time: NDArray) -> bool:
@@ -385,16 +415,31 @@ def full_clock(before: float, after: float, step: float, count_s: float) -> floa
     Returns
     -------
     float or None
-        Counts; None where neither a register's width fits nor a day.
+        Counts; None where neither a register's width fits nor whole hours.
     """
     near = [limit for limit in REGISTERS if (1.0 - NEAR) * limit < before < limit]
     # A counter with a sign continues at its lowest number, below zero.
     moduli = [2.0 * near[0] if after < 0.0 else near[0]] if near else []
-    # A clock of the day begins again at midnight, without a pause.
-    day = float(f"{1e-9 * DAY_NS / count_s:.12g}")
-    if 0.0 < after + day - before <= 20.0 * step:
-        moduli.append(day)
+    # A clock of the day begins again at midnight, without a pause; others after 1, 10 or 12 hours.
+    hours = np.round(before * count_s / HOUR_S)
+    whole_hours = float(f"{hours * HOUR_S / count_s:.12g}")
+    if hours >= 1.0 and 0.0 < after + whole_hours - before <= 20.0 * step:
+        moduli.append(whole_hours)
     return moduli[0] if moduli else None
+
+
+def is_usual_modulus(modulus: float, count_s: float) -> bool:
+    """Return whether a clock wraps around as registers or clocks of the day do.
+
+    Parameters
+    ----------
+    modulus : float
+        Reading at which it wraps around, in counts.
+    count_s : float
+        Duration of a count, s.
+    """
+    day = float(f"{1e-9 * DAY_NS / count_s:.12g}")
+    return modulus in (*REGISTERS, *(2.0 * one for one in REGISTERS), day)
 
 
 def _if_full(before: float, after: float, step: float, count_s: float) -> str:
