@@ -192,7 +192,7 @@ class _Recorder:
                     number, answered_at, fault = at, time.monotonic(), None
                     if number < self._planned:
                         self._widths.append(row.answered - row.asked)
-                        for whole in torn.take([seconds, *row.values, number], row.values):
+                        for whole in torn.take([seconds, *row.values, number], number, row.values):
                             journal.append(whole)
                         self._torn_rows = torn.torn
             now = time.monotonic()

@@ -36,50 +36,69 @@ class TornRows(Generic[Row]):
             Counts per SI unit of each.
         """
         self._columns, self._counts_per_unit = tuple(columns), tuple(counts_per_unit)
-        # Changes of each value that must have been small: noise of this size is no tear.
+        # Changes of each value that must have been small: noise of a word's size is no tear.
         before = 10
         self._changes = [deque[float](maxlen=before) for _ in columns]
-        self._last: tuple[float, ...] | None = None
-        self._held: list[tuple[Row, tuple[float, ...]]] = []
+        self._last: tuple[int, tuple[float, ...]] | None = None
+        self._held: list[tuple[Row, int, tuple[float, ...]]] = []
         self.torn = 0
         """Rows that were left out."""
 
-    def take(self, row: Row, values: Sequence[float]) -> list[Row]:
+    def take(self, row: Row, number: int, values: Sequence[float]) -> list[Row]:
         """Return the rows that are known to be whole by now, this one or those before it.
 
         A leap that lasts is one of the machine, as an encoder's new turn.
+
+        Parameters
+        ----------
+        row : object
+            What is returned once it is known to be whole.
+        number : int
+            Of its sample; some may be missing.
+        values : sequence of float
+            SI units.
         """
         most_held = 5
         counts = tuple(
             values[at] * each for at, each in zip(self._columns, self._counts_per_unit, strict=True)
         )
-        changes = self._changes_to(counts)
-        if not self._held:
-            if not any(map(self._is_suspicious, range(len(changes)), changes)):
-                return self._release(row, counts)
-            self._held.append((row, counts))
-            return []
-        if all(abs(change) <= NEAR for change in changes):
+        changes, near = self._changes_to(counts), self._near(number)
+        leaps = [
+            abs(abs(change) - WORD) <= close for change, close in zip(changes, near, strict=True)
+        ]
+        if not self._held and not any(leaps):
+            return self._release(row, number, counts)
+        is_back = all(abs(change) <= close for change, close in zip(changes, near, strict=True))
+        if self._held and is_back:
             self.torn += len(self._held)
             self._held.clear()
-            return self._release(row, counts)
-        self._held.append((row, counts))
-        if len(self._held) <= most_held and any(map(is_leap, changes)):
+            return self._release(row, number, counts)
+        self._held.append((row, number, counts))
+        if len(self._held) <= most_held and any(leaps):
             return []
         held, self._held = self._held, []
-        return [one for pair in held for one in self._release(*pair)]
+        return [one for each in held for one in self._release(*each)]
 
     def _changes_to(self, counts: tuple[float, ...]) -> list[float]:
-        last = counts if self._last is None else self._last
+        last = counts if self._last is None else self._last[1]
         return [now - before for now, before in zip(counts, last, strict=True)]
 
-    def _is_suspicious(self, k: int, change: float) -> bool:
-        before = self._changes[k]
-        is_quiet = len(before) == before.maxlen and max(before) <= NEAR
-        return is_quiet and is_leap(change)
+    def _near(self, number: int) -> list[float]:
+        """Return by how much each value may change up to a sample, counts; -1 if unknown."""
+        # The motion may become faster; beyond a quarter of a word nothing can be told.
+        faster, least, most, enough = 4.0, WORD / 32, WORD / 4, 3
+        passed = number - self._last[0] if self._last else 1
+        return [
+            min(max(faster * passed * max(before), least), most)
+            if len(before) >= enough and max(before) <= NEAR
+            else -1.0
+            for before in self._changes
+        ]
 
-    def _release(self, row: Row, counts: tuple[float, ...]) -> list[Row]:
-        for before, change in zip(self._changes, self._changes_to(counts), strict=True):
-            before.append(abs(change))
-        self._last = counts
+    def _release(self, row: Row, number: int, counts: tuple[float, ...]) -> list[Row]:
+        if self._last is not None:
+            passed = max(1, number - self._last[0])
+            for before, change in zip(self._changes, self._changes_to(counts), strict=True):
+                before.append(abs(change) / passed)
+        self._last = number, counts
         return [row]

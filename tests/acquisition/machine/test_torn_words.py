@@ -6,10 +6,10 @@ import pytest
 from pipelines.acquisition.machine.torn_words import TornRows
 
 
-def kept(counts):
+def kept(counts, numbers=None):
     """Indices of the rows that are kept, of a value of one count per unit."""
     torn = TornRows[int]([0], [1.0])
-    rows = [row for k, value in enumerate(counts) for row in torn.take(k, [value])]
+    rows = [row for k in numbers or range(len(counts)) for row in torn.take(k, k, [counts[k]])]
     return rows, torn.torn
 
 
@@ -31,6 +31,13 @@ def test_the_same_torn_sample_read_twice_costs_both_rows():
     torn = MOTION.copy()
     torn[100:102] = MOTION[99] + 65536
     assert set(range(300)) - set(kept(torn)[0]) == {100, 101}
+
+
+def test_a_tear_next_to_missing_rows_is_left_out_too():
+    torn = MOTION.copy()
+    torn[150] += 65536
+    numbers = [k for k in range(300) if k not in (147, 148, 151, 152)]
+    assert set(numbers) - set(kept(torn, numbers)[0]) == {150}
 
 
 @pytest.mark.parametrize(
