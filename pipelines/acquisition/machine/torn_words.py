@@ -14,7 +14,7 @@ Row = TypeVar("Row")
 WORD = 65536
 """Counts that a wrong high word is worth."""
 NEAR = WORD // 8
-"""Largest change from row to row beside which such a leap is no accident, counts."""
+"""Largest change from row to row in a value of which such a leap is no accident, counts."""
 
 
 def is_leap(change: float) -> bool:
@@ -85,7 +85,7 @@ class TornRows(Generic[Row]):
 
     def _near(self, number: int) -> list[float]:
         """Return by how much each value may change up to a sample, counts; -1 if unknown."""
-        # The motion may become faster; beyond a quarter of a word nothing can be told.
+        # The motion may become faster; beyond a quarter of a word the two look alike.
         faster, least, most, enough = 4.0, WORD / 32, WORD / 4, 3
         passed = number - self._last[0] if self._last else 1
         return [
