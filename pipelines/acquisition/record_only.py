@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from pipelines.acquisition.machine.read_only import ReadOnlyMachine, ReadOnlyRow
+from pipelines.acquisition.machine.torn_words import TornRows
 from pipelines.acquisition.modbus.exclusive_access import exclusive_access
 from pipelines.acquisition.modbus.file_lock import locked
 from pipelines.acquisition.pacing import LEAN
@@ -141,6 +142,7 @@ class _Recorder:
         self._rate_hz, self._planned = rate_hz, round(run.duration_s * rate_hz)
         self._watchdog_s = rig.safety.watchdog_s
         self._stopped_by, self._report = stopped_by, report
+        self._torn_rows = 0
         self._widths: list[float] = []
         """Time from the first request of a row to its last answer, s."""
         self.why: str | None = None
@@ -174,6 +176,8 @@ class _Recorder:
         pace = (_CounterPace if machine.has_counter else _HostPace)(self._rate_hz)
         answered_at = reported_at = time.monotonic()
         number, fault = -1, None
+        long = machine.long_integers()
+        torn = TornRows[list[float]](list(long), list(long.values()))
         while number < self._planned - 1:
             await pace.wait()
             if self._stopped_by:
@@ -188,7 +192,9 @@ class _Recorder:
                     number, answered_at, fault = at, time.monotonic(), None
                     if number < self._planned:
                         self._widths.append(row.answered - row.asked)
-                        journal.append([seconds, *row.values, number])
+                        for whole in torn.take([seconds, *row.values, number], number, row.values):
+                            journal.append(whole)
+                        self._torn_rows = torn.torn
             now = time.monotonic()
             if now - answered_at > self._watchdog_s:
                 why = fault or "the machine's counter stands still; check the machine"
@@ -204,11 +210,12 @@ class _Recorder:
         """Return how rows were timed, for the recording's metadata."""
         clock = "device" if machine.has_clock else "host"
         if not self._widths:
-            return {"clock": clock}
+            return {"clock": clock, "torn_rows": self._torn_rows}
         # The sample was taken at an unknown instant between request and answer.
         median, p99, longest = (0.5 * np.quantile(self._widths, [0.5, 0.99, 1.0])).tolist()
         return {
             "clock": clock,
+            "torn_rows": self._torn_rows,
             "uncertainty_median_s": median,
             "uncertainty_p99_s": p99,
             "uncertainty_longest_s": longest,

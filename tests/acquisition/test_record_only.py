@@ -1,5 +1,6 @@
 """A machine that its own controller moves is recorded, and nothing is ever written to it."""
 
+import asyncio
 import contextlib
 import itertools
 import json
@@ -11,7 +12,10 @@ import time
 import numpy as np
 import pytest
 
+from pipelines.acquisition.check.absent import explain_absence
 from pipelines.acquisition.check.check import check_rig
+from pipelines.acquisition.check.probe import Probe
+from pipelines.acquisition.machine.read_only import ReadOnlyMachine
 from pipelines.acquisition.record_only import record_only
 from pipelines.contracts import RECORDING
 from pipelines.errors import DeviceError, SettingsError
@@ -286,3 +290,128 @@ def test_no_command_that_moves_takes_a_recording_only_file(tmp_path, exoid):
     assert "exoid moves nothing, and writes nothing to any device" in off.out
     assert "refuses the connection" in off.err
     assert exoid("acquire", "--config", experiment, "--run", "one", "--reset-faults").code == 2
+
+
+SWING = """\
+name = "bench"
+recording_only = true
+[[drive]]
+joint = "elbow"
+port = {port}
+map = "plc"
+[map.drive.plc.read]
+{counter}{angle}{velocity}torque = {{ address = {torque}, type = "int16", unit = "N·m" }}
+[safety]
+watchdog_s = 0.6
+connect_s = 0.5
+"""
+LONG = 'address = {}, type = "int32", word_order = "{}", scale = {}'
+
+
+def swings(torn=False):
+    """Serve counter, angle and velocity in thousandths of a degree, low words first."""
+    began = time.monotonic()
+
+    def at(k):
+        angle = 66.0 + 20.0 * np.sin(6.0 * k / 100.0)
+        return round(1e3 * angle), round(1e3 * 120.0 * np.cos(6.0 * k / 100.0))
+
+    def answer(n, words):
+        k = round(100.0 * (time.monotonic() - began))
+        (angle, velocity), (before, _) = at(k), at(k - 1)
+        high = (before if torn else angle) >> 16
+        long = [angle & 0xFFFF, high & 0xFFFF, velocity & 0xFFFF, velocity >> 16 & 0xFFFF]
+        return [k & 0xFFFF, *long, 20, 0, 0]
+
+    return a_device(answer)
+
+
+@pytest.fixture
+def swinging(tmp_path):
+    """Return a rig file of a device that swings, and its server."""
+
+    def write(torn=False, by=0, order="little", scale=1e-3, counter=True, has_velocity=True):
+        server, _ = swings(torn)
+        path = tmp_path / "swing.toml"
+        text = SWING.format(
+            port=server.getsockname()[1],
+            counter='sequence = { address = 0, type = "uint16" }\n' if counter else "",
+            angle=f'angle = {{ {LONG.format(1 + by, order, scale)}, unit = "deg" }}\n',
+            velocity=f'velocity = {{ {LONG.format(3 + by, order, 1e-3)}, unit = "deg/s" }}\n'
+            if has_velocity
+            else "",
+            torque=5 + by,
+        )
+        path.write_text(text)
+        return path, server
+
+    return write
+
+
+def findings_of(path, server):
+    with server:
+        return [finding.text for finding in check_rig(path, 100.0).findings]
+
+
+def test_a_right_map_of_a_machine_that_moves_has_no_findings(swinging):
+    assert findings_of(*swinging()) == []
+
+
+def test_words_in_the_wrong_order_are_named_though_no_limits_are_known(swinging):
+    for counter in (True, False):
+        (text,) = findings_of(*swinging(order="big", has_velocity=False, counter=counter))
+        assert 'with word_order = "little" by' in text
+        assert "correct map.drive.plc.read.angle, or its address" in text
+
+
+def test_a_map_without_a_counter_that_is_one_address_off_is_named_by_its_velocity(swinging):
+    (text,) = findings_of(*swinging(by=1, counter=False))
+    assert "all of map.drive.plc.read is one address too high: subtract 1 from each" in text
+    assert "write may be" not in text
+
+
+def test_an_angle_of_another_scale_is_found_by_its_velocity(swinging):
+    (text,) = findings_of(*swinging(scale=1e-4))
+    assert text.endswith(
+        "correct the scale of map.drive.plc.read.angle or map.drive.plc.read.velocity, by a factor"
+        " of 10"
+    )
+
+
+def test_words_of_two_samples_are_named_and_never_recorded(swinging, tmp_path):
+    (text,) = findings_of(*swinging(torn=True))
+    assert "angle leaps by 65536 counts and back" in text
+    path, server = swinging(torn=True)
+    output = tmp_path / "swing.parquet"
+    settings = RunSettings(name="one", run="exo_alone", purpose="train", duration_s=2.0)
+    with server:
+        record_only(path, settings, output, 100.0, ELBOW)
+    table = RECORDING.read(output)
+    angle = np.degrees(table.frame["elbow_angle_rad"])
+    assert 45.9 < angle.min() < angle.max() < 86.1
+    assert table.metadata["reading"]["torn_rows"] > 0
+
+
+def test_an_angle_that_no_recording_holds_ends_the_run_with_its_value(swinging, tmp_path):
+    path, server = swinging(order="big")
+    settings = RunSettings(name="one", run="exo_alone", purpose="train", duration_s=1.0)
+    with server, pytest.raises(DeviceError, match=r"its angle is \S+ rad, and a recording holds"):
+        record_only(path, settings, tmp_path / "swing.parquet", 100.0, ELBOW)
+
+
+def test_a_device_behind_a_lost_connection_is_not_taken_for_another_unit(tmp_path):
+    server, _ = a_device(lambda n, words: words)  # answers as any unit
+    path = tmp_path / "bench.toml"
+    path.write_text(BENCH.format(port=server.getsockname()[1], watchdog_s=1.0))
+
+    async def run():
+        part = ReadOnlyMachine(load_recording_rig(path)).parts[0]
+        probe = Probe(part, False)
+        await probe.read()
+        part.device.line.close()
+        finding = await explain_absence(probe, [probe])
+        part.device.line.close()
+        return finding
+
+    with server:
+        assert asyncio.run(run()) is None

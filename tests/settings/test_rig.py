@@ -79,6 +79,15 @@ def test_a_virtual_rig_knows_its_geometry_and_its_loops():
             ),
         ),
         (
+            "[map.drive.servo.write]\n",
+            "[map.drive.servo.write]\nfunction = 6\n",
+            (
+                "map.drive.servo: write.function: found 6, which writes one register, but reference"
+                " takes more; the drive would follow half a value; set function = 16, or give the"
+                " drive's set-point of one register"
+            ),
+        ),
+        (
             'scale = 0.1, unit = "mA"',
             'scale = 0.0, unit = "mA"',
             ("map.drive.servo.read.current: scale: found 0, expected units per count"),

@@ -37,8 +37,11 @@ async def explain_absence(probe: Probe, probes: Sequence[Probe]) -> Finding | No
                 f'{line.label}: answers in other frames; set transport = "{transport}" of its'
                 " [line]",
             )
-    elif await _is(probe, unit):  # it is there: one answer was lost
-        return None
+    else:
+        if not line.client.connected:
+            await line.connect()
+        if await _is(probe, unit):  # it is there: one answer, or the connection, was lost
+            return None
     other = await _other_unit(probe, probes)
     if other is None:
         return None

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from pydantic import ValidationError
 
 from pipelines.acquisition.check.probe import Probe, Series
+from pipelines.acquisition.machine.drive import Drive
 from pipelines.acquisition.modbus.blocks import BlockReader
 from pipelines.errors import DeviceError
 from pipelines.settings.rig.block import ReadBlock, registers_of
@@ -44,7 +45,8 @@ def in_words(probe: Probe, moved: Moved) -> str:
     where = f"{probe.map_path}.read"
     everything = len(moved.names) == len(probe.block.names)
     what = f"all of {where} is" if everything else f"{', '.join(moved.names)} of {where} are"
-    also = f"; {probe.map_path}.write may be, too" if probe.is_drive and everything else ""
+    is_written = isinstance(probe.part, Drive)
+    also = f"; {probe.map_path}.write may be, too" if is_written and everything else ""
     if abs(moved.by) == 1:
         direction, remedy = ("low", "add 1 to") if moved.by > 0 else ("high", "subtract 1 from")
         return (

@@ -12,6 +12,8 @@ class Finding:
     text: str
     quantity: str = ""
     """Name of the register, if it is about one."""
+    is_explained: bool = False
+    """Whether the register itself shows the remedy, so that no other one is tried."""
 
     def __str__(self) -> str:
         return f"{self.device}: {self.text}"

@@ -9,7 +9,9 @@ from numpy.typing import NDArray
 from pipelines.acquisition.check.finding import Finding
 from pipelines.acquisition.check.interpretation import remedy
 from pipelines.acquisition.check.probe import Probe, Series
+from pipelines.acquisition.check.words import check_words
 from pipelines.acquisition.machine.drive import Drive
+from pipelines.contracts.checks import LARGEST_ANGLE_RAD
 from pipelines.settings.rig import RigSettings
 from pipelines.settings.rig.devices import DriveSettings
 from pipelines.settings.rig.recording_only import RecordingRig
@@ -75,6 +77,14 @@ class Expectation:
             return bool((np.abs(np.diff(values)) > longest).any())
 
 
+_ANYWHERE = Expectation(
+    -LARGEST_ANGLE_RAD,
+    LARGEST_ANGLE_RAD,
+    f"beyond the {LARGEST_ANGLE_RAD:.4g} rad that a recording holds",
+)
+"""The angles of a machine that exoid only reads."""
+
+
 def check_registers(
     probe: Probe, series: Series, rig: RigSettings | RecordingRig
 ) -> Iterator[Finding]:
@@ -99,11 +109,14 @@ def check_registers(
         expected = _of_drive(probe.part.settings, probe.in_lockstep)
     elif isinstance(rig, RigSettings):
         expected = _of_sensor(rig)
-    else:  # a machine that moves by itself may be anywhere
-        expected = {}
+    else:  # a machine that moves by itself may be anywhere that a recording holds
+        expected = dict.fromkeys(("angle", "reference"), _ANYWHERE)
     yield from _check_counter_words(probe, series)
+    findings = list(check_words(probe, series, order=isinstance(rig, RecordingRig)))
+    yield from findings
+    misread = {finding.quantity for finding in findings}
     for name in series.block.names:
-        if name not in ("sequence", "time", "status"):
+        if name not in ("sequence", "time", "status") and name not in misread:
             yield from _check_register(probe, name, series, expected.get(name, Expectation()))
 
 

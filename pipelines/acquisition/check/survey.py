@@ -18,7 +18,7 @@ from pipelines.acquisition.check.probe import Probe, Series
 from pipelines.acquisition.check.rate import Rate, check_rate, cycles
 from pipelines.acquisition.check.refusals import explain_refusal, lacks_exchange
 from pipelines.acquisition.check.rings import check_rings
-from pipelines.acquisition.check.velocity import check_velocity
+from pipelines.acquisition.check.velocity import check_velocity, shows_velocity
 from pipelines.acquisition.check.zeros import check_zeros
 from pipelines.acquisition.machine.drive import Drive
 from pipelines.acquisition.machine.force_sensor import Sensor
@@ -136,6 +136,8 @@ async def survey(machine: Machine, rate_hz: float | None, *, is_empty: bool) -> 
     report.findings += _check_rates_equal([device for device, _ in present.values()])
     if machine.rig.sampling == "recorder" and not report.findings:
         report.findings += await check_rings(machine, list(present), rate_hz)
+    # A line that is lost again and again is one finding.
+    report.findings = list(dict.fromkeys(report.findings))
     return report
 
 
@@ -162,6 +164,8 @@ async def survey_read_only(
             device.clock = measure_clock(probe, series, seconds)
             findings += check_clock(probe, series, device.clock, seconds, rate_hz)
             findings += check_latch(probe, series)
+        if probe.is_drive and not {one.quantity for one in findings} & {"angle", "velocity"}:
+            findings += check_velocity(probe, series, rate_hz)
         report.findings += [
             *_check_speed(probe, device, rate_hz),
             *await _with_likelier(probe, findings, rig, rate_hz),
@@ -338,7 +342,9 @@ async def _with_likelier(
         return findings
     misread = {finding.quantity for finding in findings} - {""}
     if misread:
-        moved = await _likelier_block(probe, misread, rig, rate_hz)
+        # Smooth values in the other order of words are evidence enough of that alone.
+        elsewhere = misread - {finding.quantity for finding in findings if finding.is_explained}
+        moved = await _likelier_block(probe, elsewhere, rig, rate_hz)
         findings = [moved] if moved else findings
     lacking = await lacks_exchange(probe)
     return [*findings, probe.finding(lacking)] if lacking else findings
@@ -358,7 +364,11 @@ async def _likelier_block(
 def _is_credible(probe: Probe, series: Series, rig: Rig, rate_hz: float | None) -> bool:
     """Return whether counter, clock and all other registers have possible values."""
     if "sequence" not in series.block.names:  # nothing else is sure to change
-        return False
+        return (
+            shows_velocity(series)
+            and not [*check_registers(probe, series, rig)]
+            and not [*check_velocity(probe, series, rate_hz)]
+        )
     seconds = float(series.answered[-1] - series.answered[0])
     counts_hz = _counts_hz(probe, rig, rate_hz)
     clock = measure_clock(probe, series, seconds)

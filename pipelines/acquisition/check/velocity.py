@@ -10,6 +10,14 @@ from pipelines.settings.rig import Register
 from pipelines.settings.rig.register import DIMENSION, UNITS
 
 TOLERANCE = 0.25
+MOVED_RAD = 0.02
+"""Least travel for a comparison."""
+
+
+def shows_velocity(series: Series) -> bool:
+    """Return whether a device moved enough for its velocity to be compared with its angle."""
+    names = set(series.block.names)
+    return {"angle", "velocity"} <= names and bool(np.ptp(series.of("angle")) >= MOVED_RAD)
 
 
 def check_velocity(probe: Probe, series: Series, rate_hz: float | None) -> Iterator[Finding]:
@@ -22,8 +30,6 @@ def check_velocity(probe: Probe, series: Series, rate_hz: float | None) -> Itera
     rate_hz : float, optional
         Samples a second in lockstep; else the instants of the answers are used.
     """
-    # Least travel for a comparison.
-    moved_rad = 0.02
     # Least correlation of angle and integral; below it, the register holds another quantity.
     correlated = 0.9
     # Largest integral of the velocity while the angle is constant.
@@ -41,7 +47,7 @@ def check_velocity(probe: Probe, series: Series, rate_hz: float | None) -> Itera
     travel = np.r_[0.0, np.cumsum(0.5 * (dq[1:] + dq[:-1]) * np.diff(t))]
     # Without means, as an integral has no zero of its own.
     angle, integral = q - q.mean(), travel - travel.mean()
-    if np.ptp(q) < moved_rad:
+    if np.ptp(q) < MOVED_RAD:
         if np.ptp(travel) > standing_rad + np.ptp(q):
             yield probe.finding(
                 f"velocity integrates to {np.ptp(travel):.3g} rad, but the angle changed by"
@@ -70,4 +76,8 @@ def _remedy(register: Register, ratio: float, where: str) -> str:
     for unit in DIMENSION["velocity"]:
         if abs(ratio * UNITS[unit] / UNITS[register.unit] - 1.0) <= TOLERANCE:
             return f'with unit = "{unit}" the two agree: correct {where}.velocity'
+    decade = 10.0 ** round(np.log10(ratio))
+    if decade != 1.0 and abs(ratio / decade - 1.0) <= TOLERANCE:
+        factor = max(decade, 1.0 / decade)
+        return f"correct the scale of {where}.angle or {where}.velocity, by a factor of {factor:g}"
     return f"correct {where}.velocity.scale (or the gear ratio in it), or the angle's unit"

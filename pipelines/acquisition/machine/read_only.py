@@ -12,6 +12,7 @@ from pipelines.acquisition.modbus.blocks import BlockReader
 from pipelines.acquisition.modbus.device import Device
 from pipelines.acquisition.modbus.line import Line, lines_of
 from pipelines.acquisition.modbus.one_client import greet
+from pipelines.contracts.checks import LARGEST_ANGLE_RAD
 from pipelines.contracts.joints import Joint
 from pipelines.errors import DeviceError
 from pipelines.settings.rig.devices import SensorSettings
@@ -63,7 +64,8 @@ class ReadOnlyPart:
         Raises
         ------
         DeviceError
-            No answer came in time, the device refused, or a value is no number.
+            No answer came in time, the device refused, or a value is no number, or an angle
+            that no recording holds.
         """
         values = self.reader.block.decode(await self.reader.read(in_motion=in_motion))
         for name, value in values.items():
@@ -71,6 +73,12 @@ class ReadOnlyPart:
                 raise DeviceError(
                     f"{self.device.label}: its {name} is {value}, expected a number; compare the"
                     " register map in the rig file with the device's manual"
+                )
+            if name in ("angle", "reference") and abs(value) > LARGEST_ANGLE_RAD:
+                raise DeviceError(
+                    f"{self.device.label}: its {name} is {value:.4g} rad, and a recording holds at"
+                    f" most {LARGEST_ANGLE_RAD:.4g}; `exoid rig check` tries other addresses, types"
+                    " and word orders"
                 )
         settings = self.settings
         if isinstance(settings, RecordedJoint) and "torque" not in values:
@@ -122,6 +130,17 @@ class ReadOnlyMachine:
             else None
             for part in self.parts
         ]
+
+    def long_integers(self) -> dict[int, float]:
+        """Return counts per SI unit of the values of a row that are integers of several words."""
+        registers = [
+            self.parts[k].reader.block.registers.get(quantity) for k, quantity, _ in self._picked
+        ]
+        return {
+            at: 1.0 / one.step
+            for at, one in enumerate(registers)
+            if one is not None and one.counts is not None and one.registers > 1
+        }
 
     @property
     def columns(self) -> list[str]:

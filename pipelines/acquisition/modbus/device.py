@@ -45,7 +45,7 @@ INSTEAD = {
     READ_HOLDING: "set function = 4 in its block, if these are input registers",
     READ_INPUT: "set function = 3 in its block, if these are holding registers",
     WRITE_SINGLE: "set write.function = 16 in its map",
-    WRITE_MULTIPLE: "set write.function = 6 in its map",
+    WRITE_MULTIPLE: "set write.function = 6 in its map, which needs a set-point of one register",
     READ_WRITE: "set write.function = 16 in its map",
 }
 """What to do where a device does not know a function."""

@@ -1,9 +1,15 @@
 """Which readings of a clock keep time with this computer."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
 from pipelines.acquisition.check.clock import _keeps_time as keeps_time
+from pipelines.acquisition.check.clock import check_clock, measure_clock
+from pipelines.acquisition.check.probe import Series
+from pipelines.modbus.register_block import Block
+from pipelines.settings.rig import Register
 
 SECONDS = np.arange(0.0, 1.0, 0.005)
 
@@ -22,3 +28,29 @@ def test_a_leap_does_not_allow_itself(leap):
 def test_a_clock_that_stands_still_or_goes_back_keeps_no_time():
     assert not keeps_time(np.zeros(200), 1.0)
     assert not keeps_time(SECONDS[::-1], 1.0)
+
+
+@pytest.mark.parametrize(
+    ("answered", "step", "is_named"),
+    [
+        (np.arange(0.0, 2.0, 0.002), 2, True),
+        (np.arange(0.0, 2.0, 0.002), 1, False),
+        # Four answers in a millisecond, then one that takes 30 ms: two samples come meanwhile.
+        (np.sort(np.concatenate([np.arange(0.0, 2.0, 0.032) + k / 4e3 for k in range(5)])), 1, 0),
+    ],
+    ids=["counts in steps of two", "counts", "answers late now and then"],
+)
+def test_only_steps_that_a_device_makes_itself_are_named(answered, step, is_named):
+    rate_hz = 50.0
+    block = Block({"sequence": Register(address=0, type="uint16")})
+    counts = (answered * rate_hz / step).astype(int) * step
+    asked = np.r_[0.0, answered[:-1]]
+    answers = [(a, b, [int(n)]) for a, b, n in zip(asked, answered, counts, strict=True)]
+    series = Series.of_answers(block, answers)
+    probe = SimpleNamespace(
+        map_path="map.drive.servo", in_lockstep=False, finding=lambda text, name: text
+    )
+    clock = measure_clock(probe, series, 2.0)
+    findings = list(check_clock(probe, series, clock, 2.0, rate_hz))
+    assert len(findings) == is_named
+    assert all("goes up by 2 at a time" in text for text in findings)

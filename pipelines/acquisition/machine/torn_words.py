@@ -1,0 +1,104 @@
+"""Rows with a long value whose words are of two samples.
+
+A device that does not latch the words of a value together may send the high word of one sample
+with the low word of the next. Where the low word has wrapped meanwhile, the value is wrong by 65536
+counts, for that one row.
+"""
+
+from collections import deque
+from collections.abc import Sequence
+from typing import Generic, TypeVar
+
+Row = TypeVar("Row")
+
+WORD = 65536
+"""Counts that a wrong high word is worth."""
+NEAR = WORD // 8
+"""Largest change from row to row in a value of which such a leap is no accident, counts."""
+
+
+def is_leap(change: float) -> bool:
+    """Return whether a change (counts) is that of a high word one too large or small."""
+    return abs(abs(change) - WORD) <= NEAR
+
+
+class TornRows(Generic[Row]):
+    """Holds a row back while one of its values may be torn."""
+
+    def __init__(self, columns: Sequence[int], counts_per_unit: Sequence[float]) -> None:
+        """Watch some values of a row, each an integer of several words.
+
+        Parameters
+        ----------
+        columns : sequence of int
+            Their indices in the values of a row.
+        counts_per_unit : sequence of float
+            Counts per SI unit of each.
+        """
+        self._columns, self._counts_per_unit = tuple(columns), tuple(counts_per_unit)
+        # Changes of each value that must have been small: noise of a word's size is no tear.
+        before = 10
+        self._changes = [deque[float](maxlen=before) for _ in columns]
+        self._last: tuple[int, tuple[float, ...]] | None = None
+        self._held: list[tuple[Row, int, tuple[float, ...]]] = []
+        self.torn = 0
+        """Rows that were left out."""
+
+    def take(self, row: Row, number: int, values: Sequence[float]) -> list[Row]:
+        """Return the rows that are known to be whole by now, this one or those before it.
+
+        A leap that lasts is one of the machine, as an encoder's new turn.
+
+        Parameters
+        ----------
+        row : object
+            What is returned once it is known to be whole.
+        number : int
+            Of its sample; some may be missing.
+        values : sequence of float
+            SI units.
+        """
+        most_held = 5
+        counts = tuple(
+            values[at] * each for at, each in zip(self._columns, self._counts_per_unit, strict=True)
+        )
+        changes, near = self._changes_to(counts), self._near(number)
+        leaps = [
+            abs(abs(change) - WORD) <= close for change, close in zip(changes, near, strict=True)
+        ]
+        if not self._held and not any(leaps):
+            return self._release(row, number, counts)
+        is_back = all(abs(change) <= close for change, close in zip(changes, near, strict=True))
+        if self._held and is_back:
+            self.torn += len(self._held)
+            self._held.clear()
+            return self._release(row, number, counts)
+        self._held.append((row, number, counts))
+        if len(self._held) <= most_held and any(leaps):
+            return []
+        held, self._held = self._held, []
+        return [one for each in held for one in self._release(*each)]
+
+    def _changes_to(self, counts: tuple[float, ...]) -> list[float]:
+        last = counts if self._last is None else self._last[1]
+        return [now - before for now, before in zip(counts, last, strict=True)]
+
+    def _near(self, number: int) -> list[float]:
+        """Return by how much each value may change up to a sample, counts; -1 if unknown."""
+        # The motion may become faster; beyond a quarter of a word the two look alike.
+        faster, least, most, enough = 4.0, WORD / 32, WORD / 4, 3
+        passed = number - self._last[0] if self._last else 1
+        return [
+            min(max(faster * passed * max(before), least), most)
+            if len(before) >= enough and max(before) <= NEAR
+            else -1.0
+            for before in self._changes
+        ]
+
+    def _release(self, row: Row, number: int, counts: tuple[float, ...]) -> list[Row]:
+        if self._last is not None:
+            passed = max(1, number - self._last[0])
+            for before, change in zip(self._changes, self._changes_to(counts), strict=True):
+                before.append(abs(change) / passed)
+        self._last = number, counts
+        return [row]
