@@ -62,3 +62,6 @@ def test_no_law_of_a_load_is_sought_at_a_joint_without_a_drive():
     laws, _ = smooth_laws(run, spans, np.ones_like(run.state[0]))
     of_load = {(law.kind, law.joint) for law in laws if "load" in law.kind or "gain" in law.kind}
     assert of_load == {("load", 0), ("gain_over_time", 0), ("other_load", 1)}
+    # A constant gain of the drive, with bodies of nothing, would leave the elbow without a torque.
+    constant = 1.0
+    assert all(law.variance < constant for law in laws if law.kind == "gain_over_time")

@@ -482,9 +482,10 @@ def describe(
         )
         return f"{_unexplained(joint, pair.share)} depends on {words}{where}."
     if own[0].share < little:
+        place, size = ("", where) if where == HARDLY else (where + "," * bool(where), "")
         return (
-            f"The remaining error at {the(joint)}{where}{',' * bool(where)} depends on nothing that"
-            f" was measured: no variable and no steady tone predicts {100 * little:.0f} % of it."
+            f"The remaining error at {the(joint)}{place} depends on nothing that was measured: no"
+            f" variable and no steady tone predicts {100 * little:.0f} % of it{size}."
         )
     second = next(
         (d for d in own[1:] if d.variable != "phase" and d.share > max(0.5 * own[0].share, little)),
@@ -495,12 +496,15 @@ def describe(
     )
 
 
+HARDLY = ", and it is hardly above the noise"
+
+
 def _where(above: Sequence[Excess]) -> str:
     """Return in words the kind of run, or the file, that has the excess."""
     # Excess, as a share of the noise floor, below which its place is not reported.
     noticed = 0.2
     if not any(e.square > (noticed * e.floor_nm) ** 2 for e in above):
-        return ", and it is hardly above the noise"
+        return HARDLY
     # Ratio of squared excess between kinds of run, or files, from which it is in one of them
     # only.
     one_sided = 4.0
