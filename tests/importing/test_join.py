@@ -83,3 +83,14 @@ def test_a_guess_joins_files_of_one_run(imported, pendulum, write_csv, capsys):
     frame = outcome.recording("b_torque").frame
     assert_allclose(frame["joint_angle_rad"], pendulum.angle, atol=1e-12)
     assert np.ptp(frame["joint_torque_nm"]) > 0.0
+
+
+def test_a_guess_takes_the_slowest_clock(pendulum, write_csv, capsys):
+    """Between the rows of a faster clock, straight lines would make the angle rough."""
+    torque = write_csv({"time": pendulum.time, "torque": pendulum.torque}, name="run1_torque.csv")
+    slow = slice(None, None, 3)
+    columns = {"time": pendulum.time[slow], "angle": pendulum.angle[slow]}
+    angle = write_csv(columns, name="run1_angle.csv")
+    assert run(["import", str(torque), str(angle), "--guess"]) == 0
+    guess = tomllib.loads(capsys.readouterr().out)
+    assert guess["source"]["join"] == ["run1_angle.csv", "run1_torque.csv"]

@@ -377,7 +377,7 @@ def write_time(proposal: Proposal, guess: TimeGuess, held: Sequence[str]) -> Non
         why += ", as no other does"
     if guess.rivals:
         why += f", and so does {' and '.join(guess.rivals)}: name it as `time` of its channels"
-        why += ", with time_offset_s if they did not begin together"
+        why += ", with time_offset_s if they did not begin together, and let the slowest be [time]"
     proposal.key("column", guess.column, why, guess.sure and not guess.rivals)
     proposal.key("unit", guess.unit, guess.why, guess.unit_sure)
     if guess.plus is not None:
