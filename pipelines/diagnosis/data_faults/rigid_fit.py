@@ -172,6 +172,17 @@ def averages(motion: Motion, least: int = LEAST_BLOCKS) -> Averages | None:
     return Averages(motion, q, dq, ddq, direction, torque, cuffs)
 
 
+def together(runs: Sequence[Averages]) -> Averages:
+    """Return the blocks of several runs of one machine as those of the first."""
+    q, dq, ddq, direction, torque = (
+        np.concatenate([getattr(run, name) for run in runs])
+        for name in ("q", "dq", "ddq", "direction", "torque")
+    )
+    cuffs = [run.cuffs for run in runs if run.cuffs is not None]
+    forces = np.concatenate(cuffs) if len(cuffs) == len(runs) else None
+    return Averages(runs[0].motion, q, dq, ddq, direction, torque, forces)
+
+
 def fit(columns: Columns, torque: NDArray) -> NDArray:
     """Fit torque by columns, some of whose values cannot be negative.
 

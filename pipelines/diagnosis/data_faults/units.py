@@ -6,7 +6,7 @@ here.
 
 from collections import Counter
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import combinations
 
 import numpy as np
@@ -24,7 +24,7 @@ from pipelines.diagnosis.data_faults.proof import (
     by_motion,
     predictions,
 )
-from pipelines.diagnosis.data_faults.rigid_fit import Averages, Columns, fit, predicted
+from pipelines.diagnosis.data_faults.rigid_fit import Averages, Columns, fit, predicted, together
 from pipelines.mechanics.motion import Motion
 from pipelines.mechanics.origin import mend_in
 
@@ -166,15 +166,19 @@ class Scale:
 
 def torque_unit_faults(runs: Sequence[Averages]) -> Iterator[Fault]:
     """Yield torques of legs in another unit than N·m, and runs at another scale than others."""
-    without_witness = []
+    wrong, without_loop = [], []
     for run in runs:
-        wrong = _against_the_drives(run)
-        if wrong is None:
-            # A position loop is the better witness: it does not depend on what the joints carry.
-            wrong = _against_the_other_joint(run)
-            without_witness += [] if wrong else [run]
-        yield from (scale.fault for scale in wrong)
-    yield from (scale.fault for scale in _between_runs(without_witness))
+        by_loop = _against_the_drives(run)
+        # A position loop is the better witness: it does not depend on what the joints carry.
+        without_loop += [run] if by_loop is None else []
+        wrong += by_loop or []
+    without_witness = []
+    for kind in {run.motion.run: None for run in without_loop}:
+        of_kind = [run for run in without_loop if run.motion.run == kind]
+        scales = _against_the_other_joint(together(of_kind))
+        wrong += [replace(scale, run=run) for run in of_kind for scale in scales]
+        without_witness += [] if scales else of_kind
+    yield from (scale.fault for scale in [*wrong, *_between_runs(without_witness)])
 
 
 def _against_the_drives(run: Averages) -> list[Scale] | None:
@@ -214,7 +218,10 @@ def _torque_over_position_loop(motion: Motion, joint: int) -> float | None:
 
 
 def _against_the_other_joint(run: Averages) -> list[Scale]:
-    """Return the torques in another unit, by the shank that both drives carry."""
+    """Return the torques in another unit, by the shank that both drives carry.
+
+    One motion may not part the shank from a spring, so all runs of a kind are taken together.
+    """
     moment, scale = shank(run)
     if min(moment, scale) <= 0.0:
         return []
