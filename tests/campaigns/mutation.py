@@ -32,7 +32,12 @@ TARGETS = {
     ),
     "limits": Target(
         "pipelines/acquisition/safety/limits.py",
-        ("tests/acquisition/safety", "tests/acquisition/test_stopping.py"),
+        # The quickest first: most mutants go no further.
+        (
+            "tests/acquisition/safety/test_limit_values.py",
+            "tests/acquisition/safety",
+            "tests/acquisition/test_stopping.py",
+        ),
         300.0,
     ),
 }
