@@ -576,6 +576,7 @@ def test_a_clock_of_which_no_run_is_long_enough_is_reported_with_how_long_they_a
 def test_a_joint_that_never_moves_is_reported(imported, pendulum, write_csv):
     outcome = imported(write_csv(pendulum.columns() | {"angle": np.full(2000, 0.3)}))
     assert "pivot_angle_rad: is 0.3 in every row; it carries no information" in outcome.printed
+    assert "out of the map" not in outcome.printed  # without it nothing is left
 
 
 def test_a_sliding_joints_voltage_asks_for_its_own_gain_and_not_for_a_screw_alone():
