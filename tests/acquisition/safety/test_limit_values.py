@@ -95,6 +95,8 @@ def test_a_joint_may_stray_by_the_following_error_and_what_it_goes_on_by(rig, la
         samples = row(**{name: {"angle": 0.2 + side * error}})
         set_points = [0.2 if j == joint else 0.0 for j in range(2)]
         assert (limits.straying(samples, set_points, late) is None) == kept
+    at_the_limit = row(**{name: {"angle": side * rig.safety.following_error_rad}})
+    assert limits.straying(at_the_limit, [0.0, 0.0]) is None
     assert limits.straying(row(**{name: {"angle": nan}}), [0.0, 0.0]) is not None
 
 
@@ -121,7 +123,9 @@ def test_a_cuff_may_be_silent_for_the_watchdogs_time_and_one_of_its_turns(rig_fi
     def after(cycles, forces):
         limits = Limits(rig, rate, sensors)
         assert limits.violation(row(hip={"sequence": samples * begin}, forces=forces)) is None
-        return limits.violation(row(hip={"sequence": samples * (begin + cycles)}, forces=silent))
+        # The last sample of its cycle.
+        sequence = samples * (begin + cycles + 1) - 1
+        return limits.violation(row(hip={"sequence": sequence}, forces=silent))
 
     for first in (CUFFS_AT_REST, silent):  # silence begins at the latest with the first cycle
         assert after(most, first) is None
