@@ -54,7 +54,10 @@ def main() -> None:
     with ProcessPoolExecutor(chosen.workers, get_context("spawn")) as pool:
         pending = [pool.submit(task) for task in tasks]
         results = [one for done in as_completed(pending) for one in done.result()]
-    command = f"python -m tests.campaigns.vetoes --sessions {chosen.sessions}"
+    command = (
+        f"python -m tests.campaigns.vetoes --sessions {chosen.sessions}"
+        f" --seed-base {chosen.seed_base}"
+    )
     chosen.page.write_text(page(results, command), encoding="utf-8")
 
 
