@@ -7,6 +7,8 @@ counts, for that one row.
 
 from collections import deque
 from collections.abc import Sequence
+from itertools import pairwise
+from statistics import median
 from typing import Generic, TypeVar
 
 Row = TypeVar("Row")
@@ -41,6 +43,8 @@ class TornRows(Generic[Row]):
         self._changes = [deque[float](maxlen=before) for _ in columns]
         self._last: tuple[int, tuple[float, ...]] | None = None
         self._held: list[tuple[Row, int, tuple[float, ...]]] = []
+        self._first: list[tuple[Row, int, tuple[float, ...]]] | None = []
+        """Rows of the beginning, until there are enough to judge them; then None."""
         self.torn = 0
         """Rows that were left out."""
 
@@ -58,10 +62,13 @@ class TornRows(Generic[Row]):
         values : sequence of float
             SI units.
         """
-        most_held = 5
+        most_held, at_first = 5, 5
         counts = tuple(
             values[at] * each for at, each in zip(self._columns, self._counts_per_unit, strict=True)
         )
+        if self._first is not None and self._columns:
+            self._first.append((row, number, counts))
+            return self._begin(self._first) if len(self._first) == at_first else []
         changes, near = self._changes_to(counts), self._near(number)
         leaps = [
             abs(abs(change) - WORD) <= close for change, close in zip(changes, near, strict=True)
@@ -78,6 +85,29 @@ class TornRows(Generic[Row]):
             return []
         held, self._held = self._held, []
         return [one for each in held for one in self._release(*each)]
+
+    def _begin(self, first: list[tuple[Row, int, tuple[float, ...]]]) -> list[Row]:
+        """Return the first rows without those that lie a word off the most.
+
+        One at the very beginning may be before an encoder's new turn as well. It is left out, too:
+        a row less is better than a wrong one.
+        """
+        self._first = None
+        middle = [median(values) for values in zip(*(counts for *_, counts in first), strict=True)]
+        whole = [
+            one
+            for one in first
+            if not any(
+                abs(abs(x - m) - WORD) <= WORD / 4 for x, m in zip(one[2], middle, strict=True)
+            )
+        ]
+        steps = [
+            abs(b - a) for (*_, x), (*_, y) in pairwise(whole) for a, b in zip(x, y, strict=True)
+        ]
+        # Where values change by so much, being a word off is no sign of a tear.
+        whole = whole if max(steps, default=0.0) <= NEAR else first
+        self.torn += len(first) - len(whole)
+        return [one for each in whole for one in self._release(*each)]
 
     def _changes_to(self, counts: tuple[float, ...]) -> list[float]:
         last = counts if self._last is None else self._last[1]

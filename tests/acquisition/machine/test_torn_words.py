@@ -27,6 +27,15 @@ def test_a_high_word_of_the_sample_before_costs_its_row():
     assert rows == [k for k in range(300) if k not in wrong]
 
 
+@pytest.mark.parametrize("wrong", [[0], [1], [0, 1], [3], [4]])
+@pytest.mark.parametrize("word", [-65536, 65536])
+def test_a_torn_row_at_the_very_beginning_is_left_out(wrong, word):
+    torn = MOTION.copy()
+    torn[wrong] += word
+    rows, count = kept(torn)
+    assert count == len(wrong) and set(range(300)) - set(rows) == set(wrong)
+
+
 def test_the_same_torn_sample_read_twice_costs_both_rows():
     torn = MOTION.copy()
     torn[100:102] = MOTION[99] + 65536
