@@ -154,7 +154,7 @@ def _written(
     raw: NDArray, column: str, settings: TimeSettings, note: Note, plus: NDArray | None
 ) -> NDArray:
     """Return dates and times of day as nanoseconds."""
-    # Without its unit said, a number such as 120000 is a time of day that is written so.
+    # A number without a unit, such as 120000, is a time of day written without colons.
     is_fraction = "plus_unit" in settings.model_fields_set
     if plus is not None and not is_fraction:
         # A file's typed date ends with a time of its own.
