@@ -46,7 +46,7 @@ def inverse(gram: NDArray, names: Sequence[str]) -> NDArray:
         mixed = [names[i] for i in np.argsort(-weight) if weight[i] > 0.3 * weight.max()]
         raise NotIdentifiable(
             f"the motion does not separate {' and '.join(mixed)}: any of them can stand for the"
-            " others. Excite more harmonics, move all joints at once, leave a joint that rests out,"
-            " or record longer"
+            " others. Excite more harmonics, move all joints at once, leave out a joint at rest, or"
+            " record longer"
         )
     return np.linalg.inv(scaled) / np.outer(size, size)

@@ -205,10 +205,7 @@ def read_log(source: Source, settings: ImportMap, map_path: Path) -> Log:
             )
         if name not in source.names:
             # Names that were numbered for want of a header explain the most.
-            siblings = [
-                one for one in source.names if one.startswith(name.rpartition(".")[0] + ".")
-            ]
-            reason = "; ".join(source.remarks) or suggestion(name, siblings or list(source.names))
+            reason = "; ".join(source.remarks) or _similar(name, source.names)
             raise SettingsError(
                 f"has no column {name!r}, which {where} in {map_path} names; {reason}"
             )
@@ -241,6 +238,14 @@ def read_log(source: Source, settings: ImportMap, map_path: Path) -> Log:
     time_s = clock.seconds(stamps, origin, settings.time, note)
     runs = tuple(clock.runs(time_s, stamps, settings.time.count_s, note))
     return Log(source, settings.time, channels, columns, origin, len(stamps), runs, findings)
+
+
+def _similar(name: str, names: Sequence[str]) -> str:
+    """Suggest a column in the place of one that is missing."""
+    # Within its own group, as other groups may have columns of nearly the same name.
+    group = name.rpartition(".")[0] + "."
+    siblings = [sibling for sibling in names if sibling.startswith(group)]
+    return suggestion(name, siblings or list(names))
 
 
 def _channels(settings: ImportMap, source: Source) -> Iterator[Channel]:

@@ -17,8 +17,8 @@ def mend_in(run: Run, key: str) -> str:
     return "mend its register in the rig file"
 
 
-def read_new_values(run: Run) -> str:
-    """Return how to leave out values that a drive gave again."""
+def remedy_for_repeats(run: Run) -> str:
+    """Explain how to leave out values that a drive gave again."""
     if "imported" in run.metadata:
         return 'set `keep = "new"` in the map\'s [time] and import again'
     return "wait for new data before reading"

@@ -320,6 +320,17 @@ def test_dates_with_the_day_first_are_read_and_what_is_none_is_refused_by_what_i
     assert "has '03/05/24 11.59', expected a date such as 2026-01-31" in american.err
 
 
+@pytest.mark.parametrize(("unit", "seconds"), [("min", 60.0), ("d", 86400.0)])
+def test_a_clock_that_starts_over_within_its_first_minute_or_day_has_its_fractions(
+    imported, pendulum, write_csv, unit, seconds
+):
+    """Its whole part never changes, whatever its fractions do."""
+    path = write_csv(pendulum.columns() | {"time": pendulum.time % 2.0 / seconds})
+    outcome = imported(path, map_text=MAP.replace('unit = "s"', f'unit = "{unit}"', 1))
+    assert outcome.code == 0
+    assert "clock starts over" in outcome.printed
+
+
 def test_fractions_without_leading_zeros_are_refused_as_that(imported, pendulum, write_csv):
     """As ``printf("%d.%d")`` writes seconds and microseconds."""
     microseconds = np.round(1e6 * pendulum.time).astype(int)

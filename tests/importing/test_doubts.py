@@ -310,6 +310,18 @@ def test_a_joint_whose_torque_is_zero_throughout_is_proposed_as_passive(
     assert "effort1 is 0 throughout" in doubts["joint[1].drive"]
 
 
+def test_a_joint_whose_commanded_torque_is_zero_is_not_proposed_as_passive(
+    guessed, pendulum, write_csv
+):
+    """Another loop may drive it."""
+    columns = {"time": pendulum.time}
+    for k in (0, 1):
+        columns[f"position{k}"] = np.roll(pendulum.angle, 200 * k)
+    columns |= {"effort0": pendulum.torque, "effort_cmd1": 0.0 * pendulum.torque}
+    text, doubts = guessed(write_csv(columns))
+    assert "joint[1].drive" not in doubts and 'drive = "none"' not in text
+
+
 def test_a_clock_that_wraps_around_after_whole_hours_is_proposed_and_unsure(
     guessed, pendulum, write_csv
 ):

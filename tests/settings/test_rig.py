@@ -83,8 +83,8 @@ def test_a_virtual_rig_knows_its_geometry_and_its_loops():
             "[map.drive.servo.write]\nfunction = 6\n",
             (
                 "map.drive.servo: write.function: found 6, which writes one register, but reference"
-                " takes more; the drive would follow half a value; set function = 16, or give the"
-                " drive's set-point of one register"
+                " takes more; the drive would follow half a value. Set function = 16, or use a"
+                " set-point of one register"
             ),
         ),
         (

@@ -81,17 +81,17 @@ def check_clock(
 def _check_counter(
     probe: Probe, series: Series, clock: Clock, seconds: float, rate_hz: float | None
 ) -> Iterator[Finding]:
-    # Steps that prove that the device itself counts so.
-    enough = 3
+    # Fewest steps, and their share of all, from which the device itself counts so.
+    enough, majority = 3, 0.5
     counter, where = series.of("sequence", counts=True), f"{probe.map_path}.read.sequence"
     steps = np.diff(counter)
+    measured_hz = (counter[-1] - counter[0]) / seconds
     if _counts(counter, seconds, rate_hz):
         # Several samples may have come between two answers that are far apart.
-        measured_hz = (counter[-1] - counter[0]) / seconds
-        most = 1.0 + measured_hz * (series.answered[1:] - series.asked[:-1])
-        leaps = np.count_nonzero(steps > most)
-        often = leaps >= max(enough, np.count_nonzero(steps) / 2)
-        if clock.step > 1 and not probe.in_lockstep and often:
+        possible = 1.0 + measured_hz * (series.answered[1:] - series.asked[:-1])
+        too_large = np.count_nonzero(steps > possible)
+        is_its_own = too_large >= max(enough, majority * np.count_nonzero(steps))
+        if clock.step > 1 and not probe.in_lockstep and is_its_own:
             yield probe.finding(
                 f"its counter goes up by {clock.step:g} at a time, expected 1 for each sample;"
                 f" correct {where}.scale, or let the device count samples",
@@ -101,11 +101,10 @@ def _check_counter(
     mended = remedy(
         "sequence", "", where, series, lambda v: _counts(v, seconds, rate_hz), counts=True
     )
-    measured = (counter[-1] - counter[0]) / seconds
     expected = f"{rate_hz:g}" if rate_hz else "a sample rate"
     otherwise = f"is it sampling? Set its rate or acquire.sample_rate_hz, or correct {where}"
     yield probe.finding(
-        f"its counter goes up by {measured:.4g} a second, from {counter[0]:.6g} to"
+        f"its counter goes up by {measured_hz:.4g} a second, from {counter[0]:.6g} to"
         f" {counter[-1]:.6g}, expected {expected}; {mended or otherwise}",
         "sequence",
     )

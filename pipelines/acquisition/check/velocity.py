@@ -10,8 +10,9 @@ from pipelines.settings.rig import Register
 from pipelines.settings.rig.register import DIMENSION, UNITS
 
 TOLERANCE = 0.25
+"""Largest relative deviation of a ratio from that of two units or scales."""
 MOVED_RAD = 0.02
-"""Least travel for a comparison."""
+"""Least travel for a comparison, rad."""
 
 
 def shows_velocity(series: Series) -> bool:

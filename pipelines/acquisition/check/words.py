@@ -19,8 +19,11 @@ def check_words(probe: Probe, series: Series, *, order: bool) -> Iterator[Findin
 
     Parameters
     ----------
+    probe : Probe
+    series : Series
+        Repeated readings of its block.
     order : bool
-        Whether to check the order too: limits do so where there are some.
+        Whether to check the order, too. The limits of a drive show a wrong one by themselves.
     """
     for name, register in series.block.registers.items():
         if name in ("sequence", "time") or register.registers == 1 or register.counts is None:
@@ -69,11 +72,15 @@ def _is_torn(steps: NDArray) -> bool:
 
 
 def _steps(series: Series, name: str, register: Register) -> NDArray:
+    """Return the sizes of the changes of a value that are not zero, counts, (k,)."""
     return np.abs(_signed_steps(series, name, register))
 
 
 def _signed_steps(series: Series, name: str, register: Register) -> NDArray:
-    """Return the changes of a value in counts, those that are not zero, (n,)."""
+    """Return the changes of a value that are not zero, counts, (k,).
+
+    Without any, return one of zero, so that there is a largest one.
+    """
     raw = register.model_copy(update={"scale": 1.0, "offset": 0.0, "unit": "1"})
     steps = np.diff(series.of(name, raw)[series.fresh])
     return steps[steps != 0.0] if steps.any() else np.zeros(1)

@@ -64,8 +64,8 @@ class ReadOnlyPart:
         Raises
         ------
         DeviceError
-            No answer came in time, the device refused, or a value is no number, or an angle
-            that no recording holds.
+            No answer came in time, the device refused, a value is no number, or an angle is
+            larger than a recording may hold.
         """
         values = self.reader.block.decode(await self.reader.read(in_motion=in_motion))
         for name, value in values.items():

@@ -216,10 +216,12 @@ def _laws_of(run: Run, spans: Spans, load: NDArray, j: int) -> Iterator[tuple[st
             yield "load", 1, column
     # Half waves over the longest run: the slowest change is a single rise or fall.
     phase = np.pi * (run.time - run.time[0]) / spans.duration_s
-    # A constant gain would let bodies without inertia explain that a passive joint has no torque.
-    constant = 1 if any(joint.is_passive for joint in joints) else 0
-    for k in range(constant, 0 if joints[j].is_passive else 4):
-        yield "gain_over_time", k, force * np.cos(k * phase)
+    if not joints[j].is_passive:
+        # A constant gain of the drives would let bodies without inertia explain that a passive
+        # joint has no torque.
+        lowest = 1 if any(joint.is_passive for joint in joints) else 0
+        for k in range(lowest, 4):
+            yield "gain_over_time", k, force * np.cos(k * phase)
     for k in range(1, 4):
         yield "friction_over_time", k, way * np.cos(k * phase)
         yield "friction_over_time", k, here * np.cos(k * phase)

@@ -21,7 +21,7 @@ from pipelines.diagnosis.data_faults.fault import (
 from pipelines.diagnosis.data_faults.proof import Proof, compared, predictions
 from pipelines.diagnosis.data_faults.rigid_fit import averages
 from pipelines.mechanics.motion import CUFFS, Motion
-from pipelines.mechanics.origin import read_new_values
+from pipelines.mechanics.origin import remedy_for_repeats
 from pipelines.mechanics.stretches import edge
 from pipelines.signals.blocks import dilate
 from pipelines.signals.held import are_held
@@ -102,7 +102,7 @@ def _repeated(motion: Motion) -> Iterator[Fault]:
             WHOLE_ROW if together else column(motion, j, "angle"),
             f"{samples.sum()} repeated samples ({100 * share:.2g} %), {when(motion, intervals)}:"
             f" {who} gave the last sample's values again while the joint moved;"
-            f" {read_new_values(motion)}",
+            f" {remedy_for_repeats(motion)}",
             samples,
         )
 
@@ -124,9 +124,9 @@ def _has_moved(motion: Motion, angle: NDArray, same: NDArray) -> NDArray:
         new = np.flatnonzero(~same[:, j])
         # Scatter of the new angles about the filtered speed.
         noise = median_abs_deviation(np.diff(angle[new, j] - travel[new, j]), scale="normal")
-        last = new[np.searchsorted(new, np.arange(len(angle)), side="right") - 1]
-        since = np.abs(travel[:, j] - travel[last, j])
-        moved[:, j] = since > COUNTS * _count_of(angle[:, j]) + NOISES * noise
+        last_new = new[np.searchsorted(new, np.arange(len(angle)), side="right") - 1]
+        travel_since = np.abs(travel[:, j] - travel[last_new, j])
+        moved[:, j] = travel_since > COUNTS * _count_of(angle[:, j]) + NOISES * noise
     return moved
 
 

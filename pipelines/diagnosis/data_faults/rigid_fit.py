@@ -27,9 +27,11 @@ FROM_POSITIVE = np.array([[1.0, 1, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 
 """X1..X4 from (X1 - X2, X2, X3, X4), none of which is negative: M(q) > 0 needs X1 > X2 > 0."""
 POWERS = 3
 """Degree of the law of a joint's own angle."""
-PARTS, STRETCHES = 5, 20
-"""Parts of a run, each predicted from the others, and stretches that belong to them in turn: drifts
-reach all parts, and seldom has one of them an angle that no other has."""
+PARTS = 5
+"""Parts of a run, each predicted from the others."""
+STRETCHES = 20
+"""Stretches of a run that belong to its parts in turn, so that drifts reach all of them, and hardly
+any angle occurs in only one."""
 AS_RECORDED, KNEE_REVERSED, EXCHANGED = (
     ((0, 1), (1.0, 1.0)),
     ((0, 1), (1.0, -1.0)),
@@ -172,8 +174,8 @@ def averages(motion: Motion, least: int = LEAST_BLOCKS) -> Averages | None:
     return Averages(motion, q, dq, ddq, direction, torque, cuffs)
 
 
-def together(runs: Sequence[Averages]) -> Averages:
-    """Return the blocks of several runs of one machine as those of the first."""
+def pooled(runs: Sequence[Averages]) -> Averages:
+    """Return the blocks of several runs of one machine as those of its first run."""
     q, dq, ddq, direction, torque = (
         np.concatenate([getattr(run, name) for run in runs])
         for name in ("q", "dq", "ddq", "direction", "torque")
@@ -202,9 +204,11 @@ def fit(columns: Columns, torque: NDArray) -> NDArray:
     # Unit columns keep the eigenvalues comparable, whatever the units.
     scale = np.maximum(np.sqrt(np.einsum("ij,ij->j", everything, everything)), 1e-12)
     gram = (everything / scale).T @ (everything / scale)
-    # Over small angles gravity is nearly a law of the angle, and only rounding parts the two. A
-    # part of the torque that is 10,000 times the whole costs as much as to explain nothing.
-    gram[np.diag_indices(len(gram) - 1)] += 1e-8
+    # Over small angles gravity is nearly a law of the angle: without a penalty, rounding would
+    # choose huge parts of the torque that cancel. A part of 10,000 times the whole torque costs as
+    # much as to explain nothing.
+    ridge = 1e-8
+    gram[np.diag_indices(len(gram) - 1)] += ridge
     p = columns.positive.shape[1]
     kept, free = np.r_[:p, len(gram) - 1], np.s_[p : len(gram) - 1]
     # Once free columns are projected out, only columns of known sign remain to be fitted.

@@ -90,20 +90,32 @@ def _far_branches(x: NDArray, most: int) -> list[NDArray]:
 
 
 def _joined(x: NDArray, far: NDArray) -> list[NDArray]:
-    """Return the channel (n,) with its far branch as the near one's other sign.
+    """Return the ways to read a channel (n,) if its far branch holds the values of the other sign.
 
-    Where it goes from one branch to the other, it must jump less than as recorded.
+    Parameters
+    ----------
+    x : (n,) array
+        As recorded, in any unit.
+    far : (n,) bool array
+        Where a value is of the branch farther from zero.
+
+    Returns
+    -------
+    list of (n,) array
+        Those that jump less than as recorded from one branch to the other; often none.
     """
     other_sign = -np.sign(np.median(x[~far]))
     ends = (x[far].min(), x[far].max())
-    ways = [np.where(far, sign * (x - end), x) for sign in (1.0, -1.0) for end in ends]
+    readings = [np.where(far, sign * (x - end), x) for sign in (1.0, -1.0) for end in ends]
     between = far[1:] != far[:-1]
 
-    def jump(one: NDArray) -> float:
-        return float(np.abs(np.diff(one))[between].sum())
+    def jump(values: NDArray) -> float:
+        return float(np.abs(np.diff(values))[between].sum())
 
     return [
-        way for way in ways if np.sign(np.median(way[far])) == other_sign and jump(way) < jump(x)
+        reading
+        for reading in readings
+        if np.sign(np.median(reading[far])) == other_sign and jump(reading) < jump(x)
     ]
 
 

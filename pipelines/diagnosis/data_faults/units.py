@@ -24,7 +24,7 @@ from pipelines.diagnosis.data_faults.proof import (
     by_motion,
     predictions,
 )
-from pipelines.diagnosis.data_faults.rigid_fit import Averages, Columns, fit, predicted, together
+from pipelines.diagnosis.data_faults.rigid_fit import Averages, Columns, fit, pooled, predicted
 from pipelines.mechanics.motion import Motion
 from pipelines.mechanics.origin import mend_in
 
@@ -166,18 +166,22 @@ class Scale:
 
 def torque_unit_faults(runs: Sequence[Averages]) -> Iterator[Fault]:
     """Yield torques of legs in another unit than N·m, and runs at another scale than others."""
-    wrong, without_loop = [], []
+    wrong: list[Scale] = []
+    without_loop: list[Averages] = []
     for run in runs:
-        by_loop = _against_the_drives(run)
         # A position loop is the better witness: it does not depend on what the joints carry.
-        without_loop += [run] if by_loop is None else []
-        wrong += by_loop or []
+        by_loop = _against_the_drives(run)
+        if by_loop is None:
+            without_loop.append(run)
+        else:
+            wrong += by_loop
     without_witness = []
     for kind in {run.motion.run: None for run in without_loop}:
         of_kind = [run for run in without_loop if run.motion.run == kind]
-        scales = _against_the_other_joint(together(of_kind))
+        scales = _against_the_other_joint(pooled(of_kind))
         wrong += [replace(scale, run=run) for run in of_kind for scale in scales]
-        without_witness += [] if scales else of_kind
+        if not scales:
+            without_witness += of_kind
     yield from (scale.fault for scale in [*wrong, *_between_runs(without_witness)])
 
 

@@ -449,6 +449,10 @@ def excesses(runs: Sequence[Run], residuals: Sequence[NDArray], floor: Floor) ->
     ]
 
 
+HARDLY_ABOVE_NOISE = ", and it is hardly above the noise"
+"""End of a sentence on a residual that is not much larger than its noise floor."""
+
+
 def describe(
     machine: Machine,
     results: Sequence[Dependence],
@@ -482,11 +486,14 @@ def describe(
         )
         return f"{_unexplained(joint, pair.share)} depends on {words}{where}."
     if own[0].share < little:
-        place, size = ("", where) if where == HARDLY else (where + "," * bool(where), "")
-        return (
-            f"The remaining error at {the(joint)}{place} depends on nothing that was measured: no"
-            f" variable and no steady tone predicts {100 * little:.0f} % of it{size}."
+        subject = f"The remaining error at {the(joint)}"
+        predicate = (
+            "depends on nothing that was measured: no variable and no steady tone predicts"
+            f" {100 * little:.0f} % of it"
         )
+        if where == HARDLY_ABOVE_NOISE:  # not a place: it would part subject and predicate
+            return f"{subject} {predicate}{where}."
+        return f"{subject}{where}, {predicate}." if where else f"{subject} {predicate}."
     second = next(
         (d for d in own[1:] if d.variable != "phase" and d.share > max(0.5 * own[0].share, little)),
         None,
@@ -496,15 +503,15 @@ def describe(
     )
 
 
-HARDLY = ", and it is hardly above the noise"
-
-
 def _where(above: Sequence[Excess]) -> str:
-    """Return in words the kind of run, or the file, that has the excess."""
+    """Return the end of a sentence on the residual: the kind of run, or the file, that has it.
+
+    It is ``HARDLY_ABOVE_NOISE`` where no run has a noticeable excess.
+    """
     # Excess, as a share of the noise floor, below which its place is not reported.
     noticed = 0.2
     if not any(e.square > (noticed * e.floor_nm) ** 2 for e in above):
-        return HARDLY
+        return HARDLY_ABOVE_NOISE
     # Ratio of squared excess between kinds of run, or files, from which it is in one of them
     # only.
     one_sided = 4.0

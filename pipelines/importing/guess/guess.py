@@ -61,8 +61,8 @@ def propose(paths: Sequence[Path]) -> Proposal:
             raise InputError(_no_clock(names, columns))
     for path in paths[1:]:
         _check_columns(path, source, join)
-    of_columns = _of_the_same_rows(time, columns) | dict(source.clocks)
-    clocks = _onto_one_clock(of_columns, time.column, columns)
+    own_clocks = _clocks_by_rows(time, columns) | dict(source.clocks)
+    clocks = _onto_one_clock(own_clocks, time.column, columns)
     clocks |= _into_blank_rows(names, time.column, columns)
     columns[time.column] = time.stamps(*(columns[name] for name in time.columns))
     # Within one run, because integrals and fits across a restart of the clock mean nothing.
@@ -106,7 +106,7 @@ def propose(paths: Sequence[Path]) -> Proposal:
         proposal.doubt("joint.velocity.unit", "follows from the unit of time, which is unsure")
     _write_geometry(proposal, joints)
     _write_recordings(
-        proposal, paths, [_period(path, join, time, joints, of_columns) for path in paths]
+        proposal, paths, [_period(path, join, time, joints, own_clocks) for path in paths]
     )
     _write_unused(proposal, [name for name in source.names if name not in used], columns)
     return proposal
@@ -174,24 +174,27 @@ def _without_blanks(values: NDArray) -> NDArray:
     return values[np.isfinite(values)] if values.dtype.kind == "f" else values
 
 
-def _of_the_same_rows(time: TimeGuess, columns: Columns) -> dict[str, str]:
-    """Return the clock of each column that has values where another clock has stamps, only."""
+def _clocks_by_rows(time: TimeGuess, columns: Columns) -> dict[str, str]:
+    """Return the rival clock of each column that has its values in just the rows of its stamps.
+
+    A rival with stamps in all rows of the main clock and no others is not told apart by rows.
+    """
 
     def rows_of(name: str) -> NDArray:
         values = columns[name]
         return np.isfinite(values) if values.dtype.kind == "f" else np.ones(len(values), bool)
 
-    owners: dict[str, str] = {}
+    clocks: dict[str, str] = {}
     for rival in time.rivals:
         rows = rows_of(rival)
         if np.array_equal(rows, rows_of(time.column)):
             continue
-        owners |= {
+        clocks |= {
             name: rival
             for name in columns
             if name not in (rival, time.column) and np.array_equal(rows_of(name), rows)
         }
-    return owners
+    return clocks
 
 
 def _onto_one_clock(clocks: Mapping[str, str], column: str, columns: Columns) -> dict[str, str]:

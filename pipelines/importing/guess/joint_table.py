@@ -372,11 +372,11 @@ class _JointWriter:
         return unit, f"{why}, but {reach:.4g} {si} is too much for a drive: is it m{si}?", False
 
     def _assumed(self, quantity: str) -> str:
-        """Return why a unit is SI where it is not read off the name."""
+        """Return why the unit of a quantity is SI where its column's name gives none."""
         return self._unread(quantity) or "no name has its unit; SI assumed"
 
     def _unread(self, quantity: str, before: str = "") -> str:
-        """Return what to set for a unit in a column's name that is not read; empty without one."""
+        """Return what to set for a unit that no map has, in a column's name; empty without one."""
         text = self.joint.columns[quantity].unread
         return f"{before}its name says {text!r}: set unit and scale by that" if text else ""
 

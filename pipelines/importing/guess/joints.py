@@ -97,12 +97,11 @@ def group_joints(
         )
         for number, (name, members) in enumerate(by_joint.items(), 1)
     ]
-    zeros = [m for m in meanings if m.quantity in TURNING and _is_zero(columns[m.column], rows)]
-    owners = {_owner(m, by_joint): m.column for m in zeros if not m.commanded}
     # A log whose drives are all silent shows no passive joint.
     if any(joint.drive for joint in joints):
+        zeros = _zero_torques(meanings, columns, rows, by_joint)
         joints = [
-            joint if joint.drive else replace(joint, zero_torque=owners.get(name))
+            joint if joint.drive else replace(joint, zero_torque=zeros.get(name))
             for name, joint in zip(by_joint, joints, strict=True)
         ]
     # A stable sort: joints without a place in a limb keep the order of their columns.
@@ -206,6 +205,20 @@ def _moves(values: NDArray, rows: int) -> bool:
     if not len(known) or np.ptp(known) == 0.0:
         return False
     return not np.all(np.diff(known) == 1.0)
+
+
+def _zero_torques(
+    meanings: Sequence[Meaning],
+    columns: Mapping[str, NDArray],
+    rows: int,
+    by_joint: Mapping[str, list[Meaning]],
+) -> dict[str | None, str]:
+    """Return the measured torque or current that is 0 throughout, by the key of its joint."""
+    return {
+        _owner(m, by_joint): m.column
+        for m in meanings
+        if m.quantity in TURNING and not m.commanded and _is_zero(columns[m.column], rows)
+    }
 
 
 def _is_zero(values: NDArray, rows: int) -> bool:

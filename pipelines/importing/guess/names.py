@@ -106,7 +106,7 @@ class Meaning:
     filtered: bool
     measured: bool
     unread: str = ""
-    """Text of a unit in the name that is not read, such as ``0.1 Nm``."""
+    """Text of a unit in the name that no map has, such as ``0.1 Nm``."""
 
     @property
     def rank(self) -> int:

@@ -46,9 +46,13 @@ def runs_to_join(paths: Sequence[Path]) -> tuple[list[Path], Join | None]:
     clock = clocks[0].column
     rows = [_rows(files[0], clock) for files in kinds.values()]
     drives = [any(m.quantity in TURNING for m in names) for names in meanings]
+    # Ratio of their rows up to which two clocks count as equally fast.
+    equally_fast = 1.05
     # The slowest clock first: straight lines are accurate between samples closer than the rows. Of
     # equally fast ones the torque's, as angles are smoother.
-    order = sorted(range(len(kinds)), key=lambda k: (rows[k] > 1.05 * min(rows), not drives[k]))
+    order = sorted(
+        range(len(kinds)), key=lambda k: (rows[k] > equally_fast * min(rows), not drives[k])
+    )
     join = Join(tuple(patterns[k] for k in order), clock)
     return firsts(paths, join.patterns), join
 

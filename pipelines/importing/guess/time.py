@@ -389,7 +389,8 @@ def write_time(proposal: Proposal, guess: TimeGuess, held: Sequence[str]) -> Non
     if guess.wraps_at and guess.unit != "iso8601":
         usual = clock.is_usual_modulus(guess.wraps_at, guess.count_s)
         why = "goes back where such a counter is full"
-        why += "" if usual else "; else remove it, and choose time.restarts"
+        if not usual:
+            why += "; if the clock was restarted, remove it and choose time.restarts"
         proposal.key("wraps_at", guess.wraps_at, why, usual)
     elif guess.restarts and not guess.wraps_at:
         why = 'the clock starts over; "split" makes a recording of each run'
@@ -407,7 +408,7 @@ def _advances(values: NDArray, is_named: bool) -> bool:
 
 
 def _advances_in_its_rows(meaning: Meaning, columns: Mapping[str, NDArray]) -> bool:
-    """Return whether a column that is named a clock is one, but for rows without a stamp."""
+    """Return whether a column named as a clock increases, with blanks in some rows."""
     values = columns[meaning.column]
     if meaning.quantity != "time" or values.dtype.kind != "f":
         return False

@@ -65,24 +65,28 @@ def unit_in(name: str) -> UnitInName | None:
 
 
 def _with_factor(name: str) -> UnitInName | None:
-    """Return a unit that no map has, as it is a product or has a factor."""
+    """Return a unit that is a product or has a factor, and that no map has for that; else None."""
     for bracket in BRACKETS.finditer(name):
         text = bracket[1].strip()
         known = text in OTHERS or _written(text)
         has_factor = re.search(r"\d", text) and (_WORD.search(text) or "%" in text)
         is_product = re.search(r"[^\W\d_]\s*[*·/^]\s*\w", text)
         if not known and (has_factor or is_product):
-            of = None if is_product else _WORD.search(text)
-            return UnitInName(_without(name, bracket), _written(of[0]) if of else None, True, text)
+            word = None if is_product else _WORD.search(text)
+            base = _written(word[0]) if word else None
+            return UnitInName(_without(name, bracket), base, decides=True, unread=text)
     rest = FACTOR.sub(" ", name)
     unit = _WORD.search(rest)
     if rest == name or unit is None:
         return None
     factor = " ".join(match[0].strip() for match in FACTOR.finditer(name))
-    return UnitInName(_without(rest, unit), _written(unit[0]), True, f"{factor} with {unit[0]}")
+    return UnitInName(
+        _without(rest, unit), _written(unit[0]), decides=True, unread=f"{factor} with {unit[0]}"
+    )
 
 
 def _outside_of_brackets(name: str) -> UnitInName | None:
+    """Return the last unit among the words of a name, or a letter at its end that is one."""
     matches = list(_WORD.finditer(name)) or list(_LETTER.finditer(name))
     if not matches:
         return None

@@ -58,7 +58,7 @@ def check(columns: Mapping[str, NDArray], settings: ImportMap) -> Iterator[Findi
         One for each implausible value.
     """
     for joint in settings.joint:
-        yield from _still(columns, joint, moves_alone=len(settings.joint) == 1)
+        yield from _still(columns, joint, is_only_joint=len(settings.joint) == 1)
         yield from _velocity(columns, joint)
         yield from _too_short(columns, joint)
         yield from _turns_on(columns, joint)
@@ -83,14 +83,14 @@ def check(columns: Mapping[str, NDArray], settings: ImportMap) -> Iterator[Findi
 
 
 def _still(
-    columns: Mapping[str, NDArray], joint: JointSettings, *, moves_alone: bool
+    columns: Mapping[str, NDArray], joint: JointSettings, *, is_only_joint: bool
 ) -> Iterator[Finding]:
     for quantity in ("angle", *_torque_of(joint)):
         name = joint.joint.column(quantity)
         if np.ptp(columns[name]) == 0.0:
             action = "it carries no information"
-            if quantity == "angle" and not moves_alone:
-                action += "; leave a joint that rests out of the map: the others are a machine"
+            if quantity == "angle" and not is_only_joint:
+                action += "; leave a joint at rest out of the map"
             if quantity == "torque" and not columns[name].any():
                 action += '; set drive = "none" in place of the table if the joint has no drive'
             yield Finding(name, f"is {columns[name][0]:.6g} in every row", action)

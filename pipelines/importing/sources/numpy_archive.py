@@ -42,12 +42,16 @@ def _arrays(content: Any) -> tuple[dict[str, np.ndarray], list[str]]:
     arrays: dict[str, np.ndarray] = {}
     objects: list[str] = []
     for name in content.files:
+        # The archive leaves the ending out of its names.
         member = name if name in content.zip.namelist() else f"{name}.npy"
         with content.zip.open(member) as file:
             major, _ = np.lib.format.read_magic(file)
-            header = np.lib.format.read_array_header_1_0
-            kind = (header if major == 1 else np.lib.format.read_array_header_2_0)(file)[2]
-        if kind.hasobject:
+            # Version 3 differs from 2 in the encoding of field names only.
+            if major == 1:
+                _, _, dtype = np.lib.format.read_array_header_1_0(file)
+            else:
+                _, _, dtype = np.lib.format.read_array_header_2_0(file)
+        if dtype.hasobject:
             objects.append(name)
         else:
             arrays[name] = content[name]

@@ -154,7 +154,7 @@ def _written(
     raw: NDArray, column: str, settings: TimeSettings, note: Note, plus: NDArray | None
 ) -> NDArray:
     """Return dates and times of day as nanoseconds."""
-    # Without its unit said, a number such as 120000 is a time of day that is written so.
+    # A number without a unit, such as 120000, is a time of day written without colons.
     is_fraction = "plus_unit" in settings.model_fields_set
     if plus is not None and not is_fraction:
         # A file's typed date ends with a time of its own.
@@ -315,16 +315,19 @@ def runs(time_s: NDArray, raw: NDArray, count_s: float, note: Note = unnoted) ->
 
 
 def _check_fractions(stamps: NDArray, restarts: Sequence[int]) -> None:
-    """Refuse a clock that starts over again and again, but never leaves its second.
+    """Refuse a clock that goes back within its second, in one second after the other.
 
     Seconds and microseconds that were put together without leading zeros do so: 5 ms after 12 s
-    become 12.5000.
+    become 12.5000. Runs that are shorter than a minute or a day, in these units, start over within
+    the first one only.
     """
-    # Once or twice a clock may be set back within a second by chance.
+    # In a second or two a clock may be set back by chance.
     by_chance = 2
     whole = np.floor(stamps.astype(float))
     at = np.asarray(restarts, dtype=int)
-    if len(at) > by_chance and np.all(whole[at] == whole[at - 1]) and np.all(np.diff(whole) >= 0.0):
+    in_seconds = len(np.unique(whole[at]))
+    stays = np.all(whole[at] == whole[at - 1]) and np.all(np.diff(whole) >= 0.0)
+    if in_seconds > by_chance and stays:
         raise InputError(
             f"its clock goes back {len(at)} times, but its whole part never does: fractions are"
             " written without their leading zeros. Correct the stamps, or set time.rate_hz in place"

@@ -102,8 +102,8 @@ class DriveMap(Settings):
             if long:
                 raise ValueError(
                     f"write.function: found 6, which writes one register, but {long[0]} takes more;"
-                    " the drive would follow half a value; set function = 16, or give the drive's"
-                    " set-point of one register"
+                    " the drive would follow half a value. Set function = 16, or use a set-point of"
+                    " one register"
                 )
         if self.write.function != 23:
             return
