@@ -1,6 +1,6 @@
 """The torque error of a model on validation runs, and its residuals."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -8,6 +8,7 @@ import pyarrow as pa
 from numpy.typing import NDArray
 
 from pipelines.contracts.joints import columns_of, joints_of
+from pipelines.errors import InputError
 from pipelines.estimation.regression import Regression, regressions, residual_of
 from pipelines.mechanics.run import Run
 from pipelines.model import Model
@@ -73,6 +74,11 @@ def validate(
     -------
     Validation
         RMSE (J,) in N·m, with and without samples near reversals.
+
+    Raises
+    ------
+    InputError
+        If the joints of a kind of run never all move at once.
     """
     joints = motions[0].joints
     sums: dict[str, NDArray] = {}
@@ -84,10 +90,23 @@ def validate(
             for r in regressions(motion, model, cutoff_hz):
                 of_run = of_run + _sums(r, residual_of(r, model.linear_values))
             sums[motion.run] = of_run
+    _refuse_unjudged(motions, sums)
     pooled = sum(sums.values(), np.zeros((5, len(joints))))
     return Validation(
         joints=joints, pooled=_score(pooled), by_run={run: _score(s) for run, s in sums.items()}
     )
+
+
+def _refuse_unjudged(motions: Sequence[Run], sums: Mapping[str, NDArray]) -> None:
+    """Raise InputError where the joints of a kind of run never all move at once."""
+    for kind, of_run in sums.items():
+        if not of_run[2].any():
+            files = ", ".join(motion.file for motion in motions if motion.run == kind)
+            raise InputError(
+                f"{files}: at no time do all joints move away from reversals, so no torque error"
+                f" can be given ({kind}, validate); validate on a run in which all joints move, or"
+                " leave a joint that rests in all runs out of the map"
+            )
 
 
 def _sums(r: Regression, residual: NDArray) -> NDArray:

@@ -223,10 +223,9 @@ def _note_sampling(sampling: Sampling, note: Note) -> None:
         seen = f"rate changes between {fast:.4g} and {slow:.4g} Hz on the way"
         note(seen, "kept; to use the part of one rate only, set span_s in [[recording]]")
     if sampling.gaps:
-        longest_gap = max(count for _, count in sampling.gaps) / sampling.rate_hz
         seen = (
             f"{counted(len(sampling.gaps), 'gap')}, {counted(sampling.missing, 'sample')} missing,"
-            f" the longest {longest_gap:.3g} s"
+            f" the longest {sampling.longest_gap_s:.3g} s"
         )
         note(seen, "listed in `gaps`; nothing is filled in")
 

@@ -222,6 +222,18 @@ def test_one_run_cannot_be_validated(noiseless_motions):
         identify(noiseless_motions[:1])
 
 
+def test_a_validation_run_in_which_one_joint_rests_is_refused_by_its_name(noiseless_motions):
+    runs = list(noiseless_motions)
+    k = next(k for k, run in enumerate(runs) if run.purpose == "validate")
+    speed, acceleration = runs[k].dq.copy(), runs[k].ddq.copy()
+    speed[:, 0], acceleration[:, 0] = 0.0, 0.0
+    runs[k] = replace(runs[k], dq=speed, ddq=acceleration)
+    kept = [run for run in runs if (run.run, run.purpose) != (runs[k].run, "validate")]
+    with pytest.raises(InputError, match="at no time do all joints move") as refusal:
+        identify([*kept, runs[k]])
+    assert str(refusal.value).startswith(runs[k].file)
+
+
 def test_runs_of_two_machines_are_refused(noiseless_motions):
     other = noiseless_motions[1]
     longer = replace(other, geometry=replace(other.geometry, thigh_length_m=0.45))

@@ -44,6 +44,22 @@ def test_no_later_stage_blames_a_rate_that_changes_on_the_way(imported, pendulum
     assert list(timing_faults(replace(motion, file="a"))) == []
 
 
+def test_steps_that_vary_are_no_change_of_rate_and_a_gap_lasts_as_long_as_its_stamps_say(
+    imported, pendulum, write_csv
+):
+    """The gap is in a part that is slower than the run as a whole."""
+    steps = np.random.default_rng(2).choice([0.003, 0.004, 0.006, 0.009], 1400)
+    steps[1000:] = 0.007
+    steps[1200] += 1.5
+    time = np.cumsum(steps)
+    outcome = imported(write_csv(at(pendulum, time[time < pendulum.time[-1]])))
+    assert "rate changes" not in outcome.printed
+    assert "the longest 1.5 s" in outcome.printed
+    motion = motion_from_table(motion_table(outcome.recording(), FilterSettings()))
+    (gap,) = [f for f in timing_faults(replace(motion, file="a")) if "gap" in f.what]
+    assert "(1.50 s)" in gap.what
+
+
 def test_the_rate_is_that_of_the_rows_that_are_kept(imported, pendulum, write_csv):
     """A second publisher of the same joint gives no torque, at half the rate."""
     other = at(pendulum, pendulum.time[::2] + 0.0015) | {"torque": np.full(1000, np.nan)}

@@ -52,6 +52,18 @@ def test_excel_with_titles_units_and_a_text_in_a_column(imported, pendulum, tmp_
     assert_allclose(frame["pivot_torque_nm"], np.delete(pendulum.torque[:300], 99), atol=1e-12)
 
 
+@pytest.mark.parametrize("name", ["log.xlsx", "log.npz"])
+def test_a_workbook_or_archive_that_was_cut_is_said_to_be_damaged(
+    imported, pendulum, tmp_path, name
+):
+    np.savez(tmp_path / "log.npz", **pendulum.columns())
+    cut = (tmp_path / "log.npz").read_bytes()[:3000]
+    (tmp_path / name).write_bytes(cut)
+    outcome = imported(tmp_path / name)
+    assert outcome.code == 2 and "damaged or truncated" in outcome.err
+    assert "copy it again" in outcome.err
+
+
 def test_channels_of_asam_mdf_keep_the_clock_of_their_group(imported, pendulum, tmp_path):
     asammdf = pytest.importorskip("asammdf")
     file, slower = asammdf.MDF(), slice(None, None, 2)

@@ -51,6 +51,8 @@ def find_faults(motions: Sequence[Motion], accept: Sequence[FaultKind] = ()) -> 
         fault for motion in motions for fault in (*timing_faults(motion), *channel_faults(motion))
     ]
     faults = _with_short_runs_left_out(motions, faults, accept)
+    # A torque that is a copy has no scale, and no wiring, of its own.
+    copied = {fault.file for fault in faults if fault.kind is FaultKind.COPY}
     legs: list[Averages] = []
     for motion in excluding(motions, faults):
         # A run that is left out whole has nothing to compare.
@@ -61,7 +63,8 @@ def find_faults(motions: Sequence[Motion], accept: Sequence[FaultKind] = ()) -> 
         # One wrong channel makes later checks fail as well, so only the first kind is reported.
         wrong = wrong or [*sign_faults(motion)]
         faults += wrong
-        run = averages(motion) if _has_two_drives(motion) and not wrong else None
+        compares = _has_two_drives(motion) and not wrong and motion.file not in copied
+        run = averages(motion) if compares else None
         legs += [] if run is None else [run]
     faults += _of_legs(legs)
     files = [motion.file for motion in motions]

@@ -183,4 +183,5 @@ def by_good_samples(recorded: Motion, session: Sequence[Motion]) -> Proof | None
 
 
 def _percent(share: float) -> str:
-    return f"{100 * share:.2g} %"
+    percent = 100 * share
+    return f"{percent:.2g} %" if percent < 100 else f"{percent:.0f} %"

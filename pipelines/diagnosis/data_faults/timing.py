@@ -78,13 +78,15 @@ def _lost(motion: Motion, missing: NDArray) -> Iterator[Fault]:
     nothing_to_mask = np.zeros(len(motion), dtype=bool)
     long, few = missing > SINGLE, (missing > 0) & (missing <= SINGLE)
     if long.any():
-        k = int(np.argmax(missing))
+        # Beyond a usual step there, as the rate of the whole run may be another.
+        lasts = np.diff(motion.time) - local_period(motion.time)
+        k = int(np.argmax(np.where(long, lasts, -np.inf)))
         yield Fault(
             FaultKind.CLOCK,
             motion.file,
             "time_s",
             f"{_count(long.sum(), 'gap')} in the recording, the longest of {missing[k]} missing"
-            f" samples ({missing[k] / motion.sample_rate_hz:.2f} s) after {motion.time[k]:.2f} s:"
+            f" samples ({lasts[k]:.2f} s) after {motion.time[k]:.2f} s:"
             " the fit leaves them out; record the run again if it repeats",
             nothing_to_mask,
         )

@@ -80,6 +80,9 @@ def _reader(path: Path) -> Callable[[Path, SourceSettings], Source]:
         if any(part.endswith(".npy") for part in parts):
             return open_numpy
         raise InputError("is a zip archive, expected a log; unpack it and name a file in it")
+    # Workbooks and NumPy archives end with a list of their parts, without which none is found.
+    if start.startswith(b"PK\x03\x04"):
+        raise InputError("is a damaged or truncated workbook or archive; copy it again")
     if path.suffix == ".mat":  # v4 has no signature
         return open_matlab
     is_json = start.removeprefix(b"\xef\xbb\xbf").lstrip()[:1] in (b"{", b"[")

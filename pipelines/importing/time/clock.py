@@ -7,6 +7,7 @@ from itertools import pairwise
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
+from scipy.ndimage import uniform_filter1d
 
 from pipelines.errors import InputError, SettingsError
 from pipelines.importing.finding import Finding, Note, counted, noting, unnoted
@@ -166,11 +167,13 @@ def _written(
     if len(raw) and not np.isfinite(values).any():
         example = " such as 2026-01-31 12:00:00.125" if settings.format is None else ""
         day = (
-            "; where day and month may be exchanged, set time.format" if "/" in str(raw[0]) else ""
+            "; where day and month may be exchanged, set time.format"
+            if example and "/" in str(raw[0])
+            else ""
         )
         raise InputError(
             f"has {str(raw[0])[:LONGEST]!r}, expected a date{example or ' as in time.format'};"
-            f" correct time.column or time.unit in the map{day}"
+            f" correct {'time.column or time.unit' if example else 'time.format'} in the map{day}"
             f"{'; if time.plus holds numbers, set time.plus_unit' if plus is not None else ''}"
         )
     stamps = whole(values) if values.dtype.kind in "iu" else values
@@ -494,6 +497,8 @@ class Sampling:
     rate_hz: float
     gaps: Sequence[tuple[float, int]]
     """First missing time (s) and how many samples are missing."""
+    longest_gap_s: float
+    """Time without samples in the longest gap, beyond a usual step."""
     steps_s: tuple[float, float, float]
     """Shortest, median and longest step, without gaps."""
     irregular: float
@@ -515,9 +520,14 @@ class Sampling:
         period = local_period(time_s)
         gaps = [(float(time_s[k] + period[k]), int(missing[k])) for k in np.flatnonzero(missing)]
         limits = (float(regular.min()), float(np.median(regular)), float(regular.max()))
-        slow, fast = np.quantile(period, (0.9, 0.1))
+        # Means, as steps that merely vary have medians that do so too.
+        lasting = uniform_filter1d(regular, max(1, len(regular) // 20), mode="mirror")
+        slow, fast = np.quantile(lasting, (0.9, 0.1))
         rates_hz = (float(1.0 / slow), float(1.0 / fast))
-        return cls(sample_rate(time_s), gaps, limits, uneven_share(regular), rates_hz)
+        longest_gap_s = float(np.max((steps - period)[missing > 0], initial=0.0))
+        return cls(
+            sample_rate(time_s), gaps, longest_gap_s, limits, uneven_share(regular), rates_hz
+        )
 
     @property
     def missing(self) -> int:
