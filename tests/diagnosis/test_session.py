@@ -10,6 +10,8 @@ from pipelines.diagnosis.data_faults import find_faults
 from pipelines.diagnosis.detectability.detectability import detectability_of_recorded
 from pipelines.diagnosis.diagnose import diagnose
 from pipelines.diagnosis.evidence.eligibility import refuse_unfit
+from pipelines.diagnosis.evidence.prepared_runs import prepare
+from pipelines.diagnosis.selection.selection import select
 from pipelines.diagnosis.training_data import training_data
 from pipelines.errors import InputError
 from pipelines.estimation.regression import away_from_reversals
@@ -242,6 +244,30 @@ def test_a_run_that_a_fault_leaves_nothing_of_is_left_out_where_others_suffice(m
     assert {run.motion.file for run in with_it.fitted_runs} == {
         run.motion.file for run in without.fitted_runs
     }
+
+
+def with_gaps(motion, seed, share):
+    """Leave out pieces of a quarter of a second at random, other ones in each period."""
+    piece = round(0.25 * motion.sample_rate_hz)
+    is_kept = np.random.default_rng(seed).random(len(motion) // piece + 1) < share
+    return replace(motion, valid=motion.valid & np.repeat(is_kept, piece)[: len(motion)])
+
+
+def test_where_gaps_leave_no_block_of_two_periods_the_noise_is_that_above_the_motion():
+    runs = session(seed=11)
+    found = diagnose(
+        [with_gaps(m, k, 0.4) if m.purpose == "train" else m for k, m in enumerate(runs)]
+    )
+    assert not found.noise.from_periods
+    assert found.status == "nothing_missing"
+
+
+def test_what_is_too_short_to_show_its_noise_is_refused():
+    data = training_data(session(seed=11))
+    prepared = prepare(data.train, data.baseline)
+    silent = replace(prepared.noise, density=np.full_like(prepared.noise.density, np.nan))
+    with pytest.raises(InputError, match=r"blocks of the hip are usable, too few in any 20 s"):
+        select(replace(prepared, noise=silent))
 
 
 @pytest.mark.parametrize("factor", [1e-2, pytest.param(1e-6, marks=pytest.mark.slow)])

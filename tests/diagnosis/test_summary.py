@@ -126,7 +126,7 @@ def test_a_floor_that_no_repetition_shows_is_said_to_be_an_estimate(stuck):
     assert f"No validation run holds two periods{estimate}" in verdict(short)["summary"]
     without_periods = replace(stuck.noise, from_periods=False)
     weighed = replace(stuck, noise=without_periods)
-    assert "No training run holds two periods" in verdict(weighed)["summary"]
+    assert "No training run holds two usable periods" in verdict(weighed)["summary"]
     neither = replace(short, noise=without_periods)
     assert f"No run holds two periods{estimate}" in verdict(neither)["summary"]
     runs = tuple(without_a_period(run) for run in stuck.fitted_runs)

@@ -135,30 +135,37 @@ def noise_model(runs: Sequence[Run], residuals: Sequence[NDArray]) -> NoiseModel
     NoiseModel
     """
     differences = [scatter(run, residual) for run, residual in zip(runs, residuals, strict=True)]
-    from_periods = any(len(one) for one in differences)
-    pink: float | None = None
-    if from_periods:
+    if any(len(one) for one in differences):
         # Highest frequency of the fit, Hz: blocks of 25 ms pass it, and impacts are mostly above.
         highest_hz = 6.0
-        series, band = differences, (NoiseModel.wander_hz, highest_hz)
-    else:
-        series = [
-            np.where(run.usable, residual, np.nan)
-            for run, residual in zip(runs, residuals, strict=True)
-        ]
-        above = max(above_the_motion_hz(run) for run in runs)
-        # Highest begin of the band without periods, and its end, Hz.
-        latest, highest = 4.0, 8.0
-        # Here the ratio of pink noise cannot be measured.
-        band, pink = (min(above, latest), highest), 0.2
-    rate_hz = runs[0].motion.sample_rate_hz / runs[0].block.decimation
-    outputs = range(residuals[0].shape[1])
-    fits = [
-        _spectrum_of([one[:, o] for one in series if len(one)], rate_hz, band, pink)
-        for o in outputs
+        fits = _spectra(runs, differences, (NoiseModel.wander_hz, highest_hz))
+        # With many gaps, hardly a block is usable in two periods.
+        if np.isfinite(fits[0, : len(runs[0].motion.joints)]).all():
+            return NoiseModel(fits[0], fits[1], fits[2], from_periods=True)
+    series = [
+        np.where(run.usable, residual, np.nan)
+        for run, residual in zip(runs, residuals, strict=True)
     ]
-    density, correlation_s, ratio = np.array(fits).T
-    return NoiseModel(density, correlation_s, ratio, from_periods)
+    above = max(above_the_motion_hz(run) for run in runs)
+    # Highest begin of the band without periods, and its end, Hz.
+    latest, highest = 4.0, 8.0
+    # Here the ratio of pink noise cannot be measured.
+    fits = _spectra(runs, series, (min(above, latest), highest), pink=0.2)
+    return NoiseModel(fits[0], fits[1], fits[2], from_periods=False)
+
+
+def _spectra(
+    runs: Sequence[Run],
+    series: Sequence[NDArray],
+    band: tuple[float, float],
+    pink: float | None = None,
+) -> NDArray:
+    """Return density, correlation time and ratio of pink noise of each output, (3, O)."""
+    rate_hz = runs[0].motion.sample_rate_hz / runs[0].block.decimation
+    outputs = range(len(runs[0].measured[0]))
+    return np.array(
+        [_spectrum_of([x[:, o] for x in series if len(x)], rate_hz, band, pink) for o in outputs]
+    ).T
 
 
 def _spectrum_of(

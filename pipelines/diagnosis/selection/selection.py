@@ -3,8 +3,10 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
+import numpy as np
 from scipy.special import expit, logit
 
+from pipelines.contracts.joints import the
 from pipelines.diagnosis.candidates.candidate import Candidate
 from pipelines.diagnosis.candidates.library import Library, Report, build_library, silent
 from pipelines.diagnosis.criteria import CRITERIA
@@ -23,6 +25,7 @@ from pipelines.diagnosis.selection.posterior import (
     strongest,
 )
 from pipelines.effects import EFFECTS
+from pipelines.errors import InputError
 
 
 @dataclass(frozen=True)
@@ -242,7 +245,14 @@ def _with_floors(weighed: Posterior, floors: Mapping[frozenset[str], float]) -> 
 
 
 def select(prepared: PreparedRuns, report: Report = silent) -> Selection:
-    """Weigh all sets of causes and laws, and read the answer off the posterior."""
+    """Weigh all sets of causes and laws, and read the answer off the posterior.
+
+    Raises
+    ------
+    InputError
+        Where the noise of a joint's torque cannot be measured.
+    """
+    _refuse_unknown_noise(prepared)
     library, evidence, result = weighed(prepared, report)
     answer = answer_of(result)
     return Selection(
@@ -254,6 +264,18 @@ def select(prepared: PreparedRuns, report: Report = silent) -> Selection:
         tuple(findings(result, answer)),
         _router(prepared),
     )
+
+
+def _refuse_unknown_noise(prepared: PreparedRuns) -> None:
+    """Raise InputError where too little of a joint's torque is usable to measure its noise."""
+    for j, joint in enumerate(prepared.baseline.joints):
+        if not np.isfinite(prepared.noise.density[j]):
+            usable = sum(int(run.usable[:, j].sum()) for run in prepared.runs)
+            raise InputError(
+                f"{', '.join(run.motion.file for run in prepared.runs)}: {usable} blocks of"
+                f" {the(joint)} are usable, too few in any 20 s to separate noise from error;"
+                " record with fewer gaps, or longer"
+            )
 
 
 def nothing_selected(prepared: PreparedRuns) -> Selection:

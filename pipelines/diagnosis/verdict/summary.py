@@ -34,8 +34,8 @@ def _noise_without_periods(d: Diagnosis) -> str:
         return ""
     if floor:
         return (
-            " No training run holds two periods, so the noise that weighs causes is estimated from"
-            f" {_otherwise(d)}."
+            " No training run holds two usable periods, so the noise that weighs causes is"
+            f" estimated from {_otherwise(d)}."
         )
     which = "validation run" if weighed else "run"
     why = f"No {which} holds two periods" if d.has_periods else "No recording names a period"
