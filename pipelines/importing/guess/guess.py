@@ -177,7 +177,7 @@ def _without_blanks(values: NDArray) -> NDArray:
 def _clocks_by_rows(time: TimeGuess, columns: Columns) -> dict[str, str]:
     """Return the rival clock of each column that has its values in just the rows of its stamps.
 
-    A rival with stamps in all rows of the main clock and no others is not told apart by rows.
+    A rival with stamps in all rows of the main clock and no others is not distinguished by rows.
     """
 
     def rows_of(name: str) -> NDArray:
