@@ -135,9 +135,18 @@ def _refuse_unknown_noise(validate: Sequence[Run], faults: Sequence[Fault]) -> N
         if not np.isfinite(floor[j]):
             usable = sum(int(run.usable[:, j].sum()) for run in validate)
             files = [run.motion.file for run in validate]
-            wrong = "; ".join(f"{f.file}: {f.in_words}" for f in faults if f.file in files)
-            remedy = f"correct first {wrong}" if wrong else "validate on longer runs"
+            # The fault that leaves most samples out comes first.
+            wrong = sorted((f for f in faults if f.file in files), key=_left_out, reverse=True)
+            remedy = "validate on longer runs"
+            if wrong:
+                more = f" (and {len(wrong) - 1} more)" if len(wrong) > 1 else ""
+                remedy = f"correct first {wrong[0].file}: {wrong[0].in_words}{more}"
             raise InputError(
                 f"{', '.join(files)}: {usable} blocks away from {the(joint)}'s reversals, too few"
                 f" in a row to separate noise from error; {remedy}"
             )
+
+
+def _left_out(fault: Fault) -> int:
+    """Return the number of samples that a fault leaves out."""
+    return 0 if fault.samples is None else int(fault.samples.sum())
