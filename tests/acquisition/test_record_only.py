@@ -157,7 +157,7 @@ def a_device(answer, most_answers=10**9):
     return server, asked
 
 
-BENCH = """\
+RECORDING_ONLY = """\
 name = "bench"
 recording_only = true
 [[drive]]
@@ -165,13 +165,18 @@ joint = "elbow"
 port = {port}
 map = "plc"
 [map.drive.plc.read]
-sequence = {{ address = 0, type = "uint16" }}
-angle = {{ address = 1, type = "int16", scale = 1e-3, unit = "rad" }}
-torque = {{ address = 2, type = "int16", scale = 0.1, unit = "N·m" }}
+{registers}
 [safety]
 watchdog_s = {watchdog_s}
 connect_s = 0.5
 """
+BENCH = RECORDING_ONLY.replace(
+    "{registers}",
+    """\
+sequence = {{ address = 0, type = "uint16" }}
+angle = {{ address = 1, type = "int16", scale = 1e-3, unit = "rad" }}
+torque = {{ address = 2, type = "int16", scale = 0.1, unit = "N·m" }}""",
+)
 ELBOW = MechanismSettings.model_validate({"joints": [{"name": "elbow", "kind": "revolute"}]})
 
 
@@ -292,19 +297,10 @@ def test_no_command_that_moves_takes_a_recording_only_file(tmp_path, exoid):
     assert exoid("acquire", "--config", experiment, "--run", "one", "--reset-faults").code == 2
 
 
-SWING = """\
-name = "bench"
-recording_only = true
-[[drive]]
-joint = "elbow"
-port = {port}
-map = "plc"
-[map.drive.plc.read]
-{counter}{angle}{velocity}torque = {{ address = {torque}, type = "int16", unit = "N·m" }}
-[safety]
-watchdog_s = 0.6
-connect_s = 0.5
-"""
+SWING = RECORDING_ONLY.replace(
+    "{registers}",
+    '{counter}{angle}{velocity}torque = {{ address = {torque}, type = "int16", unit = "N·m" }}',
+).replace("{watchdog_s}", "0.6")
 LONG = 'address = {}, type = "int32", word_order = "{}", scale = {}'
 
 

@@ -31,17 +31,18 @@ def check_words(probe: Probe, series: Series, *, order: bool) -> Iterator[Findin
         where = f"{probe.map_path}.read.{name}"
         other = "big" if register.word_order == "little" else "little"
         steps = _steps(series, name, register)
-        steps_of_other = _steps(series, name, register.model_copy(update={"word_order": other}))
-        if order and _is_turned(series, name, steps, steps_of_other):
+        turned = register.model_copy(update={"word_order": other})
+        sizes, sizes_turned = np.abs(steps), np.abs(_steps(series, name, turned))
+        if order and _is_turned(series, name, sizes, sizes_turned):
             yield Finding(
                 probe.name,
-                f"{name} changes by up to {steps.max():.0f} counts from one reading to the next,"
-                f' and with word_order = "{other}" by {steps_of_other.max():.0f}: correct {where},'
+                f"{name} changes by up to {sizes.max():.0f} counts from one reading to the next,"
+                f' and with word_order = "{other}" by {sizes_turned.max():.0f}: correct {where},'
                 " or its address",
                 name,
                 is_explained=True,
             )
-        elif _is_torn(_signed_steps(series, name, register)):
+        elif _is_torn(steps):
             yield probe.finding(
                 f"{name} leaps by {WORD} counts and back: its words are of two instants; read a"
                 f" value that the device latches, or one of a single register, as {where}",
@@ -49,7 +50,7 @@ def check_words(probe: Probe, series: Series, *, order: bool) -> Iterator[Findin
             )
 
 
-def _is_turned(series: Series, name: str, steps: NDArray, steps_of_other: NDArray) -> bool:
+def _is_turned(series: Series, name: str, sizes: NDArray, sizes_turned: NDArray) -> bool:
     """Return whether the other order of words gives far smaller changes, and no accident does."""
     enough = 5  # changes
     # Halfway, in powers of two, between the same changes and those of a high word for a low one.
@@ -58,9 +59,9 @@ def _is_turned(series: Series, name: str, steps: NDArray, steps_of_other: NDArra
     # A value whose low word is constant may be in either order: as of an encoder of 16 bits that
     # fills the high word.
     return bool(
-        np.count_nonzero(steps) >= enough
+        np.count_nonzero(sizes) >= enough
         and np.ptp(low)
-        and ratio * steps_of_other.sum() < steps.sum()
+        and ratio * sizes_turned.sum() < sizes.sum()
     )
 
 
@@ -72,11 +73,6 @@ def _is_torn(steps: NDArray) -> bool:
 
 
 def _steps(series: Series, name: str, register: Register) -> NDArray:
-    """Return the sizes of the changes of a value that are not zero, counts, (k,)."""
-    return np.abs(_signed_steps(series, name, register))
-
-
-def _signed_steps(series: Series, name: str, register: Register) -> NDArray:
     """Return the changes of a value that are not zero, counts, (k,).
 
     Without any, return one of zero, so that there is a largest one.

@@ -19,9 +19,9 @@ NEAR = WORD // 8
 """Largest change from row to row in a value of which such a leap is no accident, counts."""
 
 
-def is_leap(change: float) -> bool:
-    """Return whether a change (counts) is that of a high word one too large or small."""
-    return abs(abs(change) - WORD) <= NEAR
+def is_leap(change: float, within: float = NEAR) -> bool:
+    """Return whether a change is that of a high word one too large or small, within some counts."""
+    return abs(abs(change) - WORD) <= within
 
 
 class TornRows(Generic[Row]):
@@ -70,9 +70,7 @@ class TornRows(Generic[Row]):
             self._first.append((row, number, counts))
             return self._begin(self._first) if len(self._first) == at_first else []
         changes, near = self._changes_to(counts), self._near(number)
-        leaps = [
-            abs(abs(change) - WORD) <= close for change, close in zip(changes, near, strict=True)
-        ]
+        leaps = [is_leap(change, close) for change, close in zip(changes, near, strict=True)]
         if not self._held and not any(leaps):
             return self._release(row, number, counts)
         is_back = all(abs(change) <= close for change, close in zip(changes, near, strict=True))
@@ -97,9 +95,7 @@ class TornRows(Generic[Row]):
         whole = [
             one
             for one in first
-            if not any(
-                abs(abs(x - m) - WORD) <= WORD / 4 for x, m in zip(one[2], middle, strict=True)
-            )
+            if not any(is_leap(x - m, WORD / 4) for x, m in zip(one[2], middle, strict=True))
         ]
         steps = [
             abs(b - a) for (*_, x), (*_, y) in pairwise(whole) for a, b in zip(x, y, strict=True)

@@ -175,14 +175,12 @@ def averages(motion: Motion, least: int = LEAST_BLOCKS) -> Averages | None:
 
 
 def pooled(runs: Sequence[Averages]) -> Averages:
-    """Return the blocks of several runs of one machine as those of its first run."""
+    """Return the blocks of several runs of one machine as those of its first run, without cuffs."""
     q, dq, ddq, direction, torque = (
         np.concatenate([getattr(run, name) for run in runs])
         for name in ("q", "dq", "ddq", "direction", "torque")
     )
-    cuffs = [run.cuffs for run in runs if run.cuffs is not None]
-    forces = np.concatenate(cuffs) if len(cuffs) == len(runs) else None
-    return Averages(runs[0].motion, q, dq, ddq, direction, torque, forces)
+    return Averages(runs[0].motion, q, dq, ddq, direction, torque, cuffs=None)
 
 
 def fit(columns: Columns, torque: NDArray) -> NDArray:

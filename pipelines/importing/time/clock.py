@@ -428,7 +428,7 @@ def full_clock(before: float, after: float, step: float, count_s: float) -> floa
     moduli = [2.0 * near[0] if after < 0.0 else near[0]] if near else []
     # A clock of the day begins again at midnight, without a pause; others after 1, 10 or 12 hours.
     hours = np.round(before * count_s / HOUR_S)
-    whole_hours = float(f"{hours * HOUR_S / count_s:.12g}")
+    whole_hours = _in_counts(hours * HOUR_S, count_s)
     if hours >= 1.0 and 0.0 < after + whole_hours - before <= 20.0 * step:
         moduli.append(whole_hours)
     return moduli[0] if moduli else None
@@ -444,8 +444,13 @@ def is_usual_modulus(modulus: float, count_s: float) -> bool:
     count_s : float
         Duration of a count, s.
     """
-    day = float(f"{1e-9 * DAY_NS / count_s:.12g}")
+    day = _in_counts(1e-9 * DAY_NS, count_s)
     return modulus in (*REGISTERS, *(2.0 * one for one in REGISTERS), day)
+
+
+def _in_counts(seconds: float, count_s: float) -> float:
+    """Return a time in counts, as a person writes it: rounding in float64 is left out."""
+    return float(f"{seconds / count_s:.12g}")
 
 
 def _if_full(before: float, after: float, step: float, count_s: float) -> str:
