@@ -7,6 +7,7 @@ from pipelines.diagnosis.evidence.noise_model import NoiseModel
 from pipelines.diagnosis.evidence.prepared_runs import prepare
 from pipelines.diagnosis.fit.validation_scheme import CrossValidation
 from pipelines.diagnosis.judged_fit import JudgedFit, judged_fit
+from pipelines.diagnosis.lines_behind import with_lines_behind
 from pipelines.diagnosis.selection.selection import select
 from pipelines.diagnosis.training_data import TrainingData
 
@@ -33,7 +34,8 @@ def by_all_runs(
     """
     first = judged.selected
     runs = (*data.train, *data.validate)
-    searched = select(prepare(runs, data.baseline), report).as_all_runs_search(first)
+    prepared = with_lines_behind(prepare(runs, data.baseline), judged)
+    searched = select(prepared, report).as_all_runs_search(first)
     by_all = judged_fit(searched, judged.scheme, noise)
     now = by_all.selected
     if now.answer.named and by_all.predicts_better_than(judged.after, noise):

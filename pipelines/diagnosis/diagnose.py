@@ -6,8 +6,9 @@
 4. *Fit*: the named causes with the baseline, their shapes refined.
 5. *Validation*: errors and gains on data that no fit has seen.
 
-``select`` does steps 2 and 3, ``judged_fit`` 4 and 5. Where the error of step 5 is above the noise,
-both are repeated with causes sought on all runs.
+``select`` does steps 2 and 3, ``judged_fit`` 4 and 5. Where further lines stand out behind the named
+causes, both are repeated with them. Where the error of step 5 is above the noise, both are repeated
+with causes sought on all runs.
 """
 
 from collections.abc import Sequence
@@ -19,6 +20,7 @@ from pipelines.diagnosis.diagnosis import Diagnosis
 from pipelines.diagnosis.evidence.prepared_runs import prepare
 from pipelines.diagnosis.fit.validation_scheme import HoldOut
 from pipelines.diagnosis.judged_fit import judged_fit
+from pipelines.diagnosis.lines_behind import with_lines_behind
 from pipelines.diagnosis.selection.selection import nothing_selected, select
 from pipelines.diagnosis.training_data import training_data
 from pipelines.mechanics.motion import Motion
@@ -67,6 +69,9 @@ def diagnose(
     report(fit_share, "fit")
     scheme = HoldOut.of(data.train, data.validate, data.baseline)
     judged = judged_fit(selected, scheme, prepared.noise)
+    behind = with_lines_behind(prepared, judged)
+    if behind is not prepared:
+        judged = judged_fit(select(behind), scheme, prepared.noise)
     # An error above the noise may mean that the training runs alone show too little.
     if not data.spoilt and judged.after.leaves_more_than_noise:
         judged = by_all_runs(
