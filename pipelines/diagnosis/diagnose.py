@@ -6,7 +6,7 @@
 4. *Fit*: the named causes with the baseline, their shapes refined.
 5. *Validation*: errors and gains on data that no fit has seen.
 
-``select`` does steps 2 and 3, ``judged_fit`` 4 and 5. Where further lines stand out behind the named
+``select`` does steps 2 and 3, ``judged_fit`` 4 and 5. Where further lines stand out behind named
 causes, both are repeated with them. Where the error of step 5 is above the noise, both are repeated
 with causes sought on all runs.
 """
