@@ -13,6 +13,7 @@ from pipelines.effects.end_stop import EndStop
 from pipelines.effects.parallel_spring import ParallelSpring
 from pipelines.effects.passive_joint_torque import PassiveJointTorque
 from pipelines.effects.position_dependent_friction import PositionDependentFriction
+from pipelines.effects.torque_cross_talk import TorqueCrossTalk
 from pipelines.effects.torque_gain import TorqueGain
 from pipelines.effects.torque_offset import TorqueOffset
 from pipelines.mechanics.geometry import Geometry
@@ -48,6 +49,8 @@ def test_a_passive_joint_has_no_effect_of_a_torque_sensor_and_an_endless_one_no_
     arm = machine_of((Joint("shoulder"), Joint("elbow", drive="none")), Geometry())
     assert TorqueOffset.possible(arm) == ["shoulder"]
     assert TorqueGain.possible(arm) == []
+    # The elbow's torque is zero, so the shoulder's channel cannot have a share of it.
+    assert TorqueCrossTalk.possible(arm) == []
     table = machine_of((Joint("table", turns=True),), Geometry(gravity_m_s2=0.0))
     level = machine_of((Joint("table"),), Geometry(gravity_m_s2=0.0))
     differ = {effect for effect in EFFECTS if effect.possible(table) != effect.possible(level)}
