@@ -201,5 +201,5 @@ def test_an_unsigned_counter_wraps_after_its_span():
             "n": Register(address=2, type="int32"),
         }
     )
-    assert block.span("time") == pytest.approx(2**32 * 1e-6)
-    assert block.span("n") == 0.0
+    assert block.modulus("time") == pytest.approx(2**32 * 1e-6)
+    assert block.modulus("n") == 0.0
