@@ -100,7 +100,7 @@ class Cause(Named):
         return bool(self.each_run)
 
     @property
-    def alike(self) -> "list[Cause | Tie]":
+    def with_ties(self) -> "list[Cause | Tie]":
         """The cause, and those that these data cannot separate from it."""
         return [self, *self.indistinguishable_from]
 
