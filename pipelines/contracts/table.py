@@ -332,7 +332,7 @@ class Contract:
         metadata : mapping
             ``contract`` is added.
         source : str, optional
-            Begin of the message.
+            Start of the message.
 
         Raises
         ------
@@ -398,7 +398,7 @@ class Contract:
         metadata : mapping
             With the joints of the table.
         source : str
-            Begin of messages.
+            Start of messages.
         named : sequence of str, optional
             Columns to require; the others may then be missing.
 

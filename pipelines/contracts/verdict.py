@@ -386,7 +386,7 @@ def check(content: Mapping[str, Any], source: str) -> Verdict:
     content : mapping
         Keys of the verdict.
     source : str
-        Begin of the message.
+        Start of the message.
 
     Raises
     ------
