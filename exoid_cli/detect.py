@@ -1,4 +1,4 @@
-"""``exoid detect``: the smallest size of each cause that a motion reveals, and which look alike."""
+"""``exoid detect``: the smallest size of each cause that a motion reveals, and which are tied."""
 
 import json
 from collections.abc import Sequence
@@ -41,7 +41,7 @@ def detect(
         typer.Option(min=0.5, max=0.999, help="Probability of finding an effect of that size."),
     ] = 0.9,
 ) -> None:
-    """Say how large each cause must be to be detected, and which causes look alike.
+    """Say how large each cause must be to be detected, and which causes cannot be separated.
 
     \b
     Examples:

@@ -4,6 +4,8 @@ A quantity's unit also determines how it scales with the machine: at twice the t
 twice as stiff.
 """
 
+import re
+from functools import cache
 from typing import Literal, NamedTuple
 
 Kind = Literal["revolute", "prismatic"]
@@ -24,26 +26,64 @@ class Unit(NamedTuple):
 
 FIRST_MOMENT = "kg·m"
 """Unit that identifies a rigid body's first moments of mass among its parameters."""
-UNITS = {
+FACTORS = {
     "N·m": Unit("N", 1, 0, 0),
-    "N·m/°C": Unit("N/°C", 1, 0, 0),
-    "N·m·s/(rad·°C)": Unit("N·s/(m·°C)", 1, 0, -1),
-    "N·m/s": Unit("N/s", 1, 0, 0),
-    "N·m·s/rad": Unit("N·s/m", 1, 0, -1),
-    "N·m·s²/rad²": Unit("N·s²/m²", 1, 0, -2),
-    "N·m/rad": Unit("N/m", 1, -1, 0),
-    "N·m/rad²": Unit("N/m²", 1, -2, 0),
     # An inertia is torque per acceleration, and accelerations scale as speed² / travel.
     "kg·m²": Unit("kg", 1, 1, -2),
     # A first moment times gravity is a torque, and gravity is the same for every machine.
-    "kg·m": Unit("kg", 1, 0, 0),
+    FIRST_MOMENT: Unit("kg", 1, 0, 0),
     "rad": Unit("m", 0, 1, 0),
-    "rad/s": Unit("m/s", 0, 0, 1),
-    "rad/s²": Unit("m/s²", 0, -1, 2),
-    "1/rad²": Unit("1/m²", 0, -2, 0),
-    "1/turn": Unit("rad/m", 0, -1, 0),
 }
-"""Units that depend on the kind of joint; s, Hz, 1 and °C do not."""
+"""Factors of a unit that depend on the kind of joint."""
+WHOLE = {
+    "1/turn": Unit("rad/m", 0, -1, 0),
+    # What becomes of 1/turn at a prismatic joint.
+    "rad/m": Unit("rad/m", 0, 0, 0),
+}
+"""Units that are not converted factor by factor."""
+_KNOWN = "|".join(sorted(FACTORS, key=len, reverse=True))
+_FACTOR = re.compile(rf"({_KNOWN}|[^·()/²³]+)([²³]?)(?=[·()/]|$)")
+"""A factor and its power."""
+_POWERS = {"": 1, "²": 2, "³": 3}
+
+
+@cache
+def unit_of(text: str) -> Unit:
+    """Return how a unit at a revolute joint depends on the kind of joint and its size.
+
+    Parameters
+    ----------
+    text : str
+        Products and one quotient of factors, such as ``N·m·s/(rad·°C)``.
+
+    Returns
+    -------
+    Unit
+        Of exponents zero for a unit that does not depend on the joint, such as °C or Hz.
+    """
+    if text in WHOLE:
+        return WHOLE[text]
+    above, _, below = text.partition("/")
+    factors = [
+        (symbol, sign * _POWERS[power])
+        for part, sign in ((above, 1), (below, -1))
+        for symbol, power in _FACTOR.findall(part)
+    ]
+    # Next to an angle or an inertia a second is the motion's, and scales as travel / speed.
+    # Elsewhere, as in a drift of N·m/s, it is wall time.
+    of_motion = any(symbol in ("rad", "kg·m²") for symbol, _ in factors)
+    time = Unit("s", 0, 1, -1) if of_motion else Unit("s", 0, 0, 0)
+    torque = travel = speed = 0
+    for symbol, power in factors:
+        unit = time if symbol == "s" else FACTORS.get(symbol, Unit(symbol, 0, 0, 0))
+        torque += power * unit.torque
+        travel += power * unit.travel
+        speed += power * unit.speed
+    prismatic = _FACTOR.sub(
+        lambda match: (FACTORS[match[1]].prismatic if match[1] in FACTORS else match[1]) + match[2],
+        text,
+    )
+    return Unit(prismatic, torque, travel, speed)
 
 
 def refuse_unknown_unit(name: str, unit: str) -> None:
@@ -52,16 +92,16 @@ def refuse_unknown_unit(name: str, unit: str) -> None:
     Raises
     ------
     ValueError
-        Names the parameter, its unit and the known ones.
+        Names the parameter, its unit and the factors of known ones.
     """
+    if unit in WHOLE:
+        return
+    known = [symbol for symbol, _ in _FACTOR.findall(unit) if symbol in FACTORS]
     # Lengths, masses and forces are the same at all joints: only their products with angles differ.
-    of_joint = [part for part in ("N·m", "rad", "turn") if part in unit]
-    known = {*UNITS, *(unit.prismatic for unit in UNITS.values())}
-    # A parameter at a prismatic joint has its unit there.
-    if of_joint and unit not in known:
+    if any(unit.count(part) > known.count(part) for part in ("N·m", "rad", "turn")):
         raise ValueError(
-            f"{name}: found the unit {unit}, expected one without {' and '.join(of_joint)}, or one"
-            f" of {', '.join(UNITS)}; add it to UNITS in pipelines/contracts/joint_units.py"
+            f"{name}: found the unit {unit}, expected products and one quotient of"
+            f" {', '.join(FACTORS)}, s and others such as °C, with powers ² and ³, or 1/turn"
         )
 
 
@@ -85,9 +125,7 @@ class Scale(NamedTuple):
         float
             1 for a unit that does not depend on the machine's size.
         """
-        if unit not in UNITS:
-            return 1.0
-        power = UNITS[unit]
+        power = unit_of(unit)
         return float(
             self.torque**power.torque * self.travel**power.travel * self.speed**power.speed
         )
@@ -95,4 +133,4 @@ class Scale(NamedTuple):
 
 def unit_at(kind: Kind, unit: str) -> str:
     """Return the unit at a kind of joint for a unit at a revolute joint."""
-    return UNITS[unit].prismatic if kind == "prismatic" and unit in UNITS else unit
+    return unit_of(unit).prismatic if kind == "prismatic" else unit

@@ -6,7 +6,7 @@ import pyarrow as pa
 from pydantic import Field
 
 from pipelines.contracts.metadata import Keys, Positive, RunKeys
-from pipelines.contracts.recording import CUFF_FORCES
+from pipelines.contracts.recording import UNCHANGED
 from pipelines.contracts.table import Column, Contract, per_joint
 
 
@@ -45,10 +45,7 @@ MOTION = Contract(
             "velocity_measured", "the drive's own velocity estimate", required=False, nullable=True
         ),
         per_joint("reference", "commanded angle", required=False, nullable=True),
-        per_joint("current", "motor current", required=False, nullable=True),
-        per_joint("temperature", "drive or motor temperature", required=False, nullable=True),
-        *CUFF_FORCES,
-        Column("sequence", "", "the device's sample counter", dtype=pa.int64(), required=False),
+        *UNCHANGED,
         Column("segment", "", "number of the stretch without gaps", dtype=pa.int64()),
         Column("valid", "", "false at filter edges and where data were bad", dtype=pa.bool_()),
     ),

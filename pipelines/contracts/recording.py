@@ -20,6 +20,14 @@ CUFF_FORCES = tuple(
     for axis, direction in (("x", "along the segment (distal)"), ("y", "forward"), ("z", "lateral"))
 )
 
+UNCHANGED = (
+    per_joint("current", "motor current", required=False, nullable=True),
+    per_joint("temperature", "drive or motor temperature", required=False, nullable=True),
+    *CUFF_FORCES,
+    Column("sequence", "", "the device's sample counter", dtype=pa.int64(), required=False),
+)
+"""Columns of a recording that its motion has as they are."""
+
 RECORDING = Contract(
     name="recording",
     version=1,
@@ -31,10 +39,7 @@ RECORDING = Contract(
         per_joint("torque", "what the drive delivers at the joint"),
         per_joint("reference", "commanded angle", required=False, nullable=True),
         per_joint("velocity", "the drive's own velocity estimate", required=False, nullable=True),
-        per_joint("current", "motor current", required=False, nullable=True),
-        per_joint("temperature", "drive or motor temperature", required=False, nullable=True),
-        *CUFF_FORCES,
-        Column("sequence", "", "the device's sample counter", dtype=pa.int64(), required=False),
+        *UNCHANGED,
     ),
     metadata=RunKeys,
     time="time_s",

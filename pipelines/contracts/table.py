@@ -10,7 +10,7 @@ from pydantic import ValidationError
 
 from pipelines import __version__
 from pipelines.contracts import checks, parquet
-from pipelines.contracts.joints import Joint, joints_of
+from pipelines.contracts.joints import QUANTITIES, Joint, joints_of
 from pipelines.contracts.metadata import TableKeys
 from pipelines.errors import ContractError
 from pipelines.validation.explain import explain
@@ -63,6 +63,8 @@ def per_joint(
     nullable : bool, optional
         Whether values may be missing.
     """
+    if quantity not in QUANTITIES:
+        raise ValueError(f"{quantity}: has no unit; add it to QUANTITIES of contracts/joints.py")
     return Column(quantity, "", meaning, required=required, nullable=nullable, per_joint=True)
 
 
@@ -330,7 +332,7 @@ class Contract:
         metadata : mapping
             ``contract`` is added.
         source : str, optional
-            Begin of the message.
+            Start of the message.
 
         Raises
         ------
@@ -396,7 +398,7 @@ class Contract:
         metadata : mapping
             With the joints of the table.
         source : str
-            Begin of messages.
+            Start of messages.
         named : sequence of str, optional
             Columns to require; the others may then be missing.
 

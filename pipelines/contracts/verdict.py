@@ -100,7 +100,7 @@ class Cause(Named):
         return bool(self.each_run)
 
     @property
-    def alike(self) -> "list[Cause | Tie]":
+    def with_ties(self) -> "list[Cause | Tie]":
         """The cause, and those that these data cannot separate from it."""
         return [self, *self.indistinguishable_from]
 
@@ -386,7 +386,7 @@ def check(content: Mapping[str, Any], source: str) -> Verdict:
     content : mapping
         Keys of the verdict.
     source : str
-        Begin of the message.
+        Start of the message.
 
     Raises
     ------

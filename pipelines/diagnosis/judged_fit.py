@@ -50,8 +50,8 @@ def judged_fit(selected: Selection, scheme: ValidationScheme, noise: NoiseModel)
 
     The most harmful cause is charged first: in a model with it, other causes may seem to harm too.
     Of causes that the searched runs cannot separate, those that predict the validation runs worse
-    than the best of them are charged. Last, each named cause is tested for being a look-alike
-    (``selection/look_alikes.py``). Those that remain are fitted again, and not judged again.
+    than the best of them are charged. Last, each named cause is tested for being the look-alike of
+    an effect that is not listed. Those that remain are fitted again, and not judged again.
 
     Parameters
     ----------

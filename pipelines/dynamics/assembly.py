@@ -46,7 +46,7 @@ class Assembly(NamedTuple):
     """The model in the form that the compiled dynamics needs.
 
     Terms are in the order: on links and inertial, on links, on drives and inertial, on drives;
-    ``bounds`` (5,) holds the begin of each group and the end of the last. Term i has the addresses
+    ``bounds`` (5,) holds the start of each group and the end of the last. Term i has the addresses
     of its kernels, ``joint[i]`` (-1 for the whole leg), values ``values[value_at[i] : value_at[i +
     1]]`` and a memory ``state_at[i] : state_at[i + 1]``. All fields are arrays, so that one
     compilation serves all models.

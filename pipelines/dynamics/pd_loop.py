@@ -226,7 +226,7 @@ def advance(a, d, w, s, loop, t, reference, enabled, angle, speed, torque, truth
             now = t + done * d.step_s
             step(a, w, s, now, d.step_s, loop.state, loop.memory, loop.load, loop.torque)
             if done == middle:
-                # The first stage is the acceleration at this step's begin, the sample's middle.
+                # The first stage is the acceleration at this step's start, the sample's middle.
                 _copy(s.rates[0, DQ], truth[2])
             done += 1
         for j in range(j_count):

@@ -104,7 +104,7 @@ class _Seen(NamedTuple):
 
 
 class _Kept(NamedTuple):
-    """State at the begin of a step, and its references and disturbance."""
+    """State at the start of a step, and its references and disturbance."""
 
     state: np.ndarray
     memory: np.ndarray
@@ -193,8 +193,8 @@ def _step(loop, t, h, wanted, disturbance, torque, network):
     """Advance leg and weights by ``h``; return whether nothing switched.
 
     A switch is a joint that turns, or a torque that reaches or leaves its limit. ``wanted`` (3, 3,
-    J) and ``disturbance`` (3, J) are given at begin, middle and end. Torque and network output at
-    the begin are written to ``torque`` and ``network`` (J,).
+    J) and ``disturbance`` (3, J) are given at start, middle and end. Torque and network output at
+    the start are written to ``torque`` and ``network`` (J,).
     """
     a, c, w, s, net, seen = loop.a, loop.c, loop.w, loop.s, loop.net, loop.seen
     state, memory, load, weights = loop.state, loop.memory, loop.load, loop.weights
@@ -247,7 +247,7 @@ def _within(wanted, disturbance, begin, length, kept):
     """Write references and disturbance of a part of a step, interpolated by parabolas."""
     for i in range(3):
         x = begin + 0.5 * i * length
-        # Lagrange's polynomials for the begin, the middle and the end of the whole step.
+        # Lagrange's polynomials for the start, the middle and the end of the whole step.
         first, middle, last = (1.0 - x) * (1.0 - 2.0 * x), 4.0 * x * (1.0 - x), x * (2.0 * x - 1.0)
         for j in range(wanted.shape[2]):
             kept.disturbance[i, j] = (
@@ -273,7 +273,7 @@ def _advance(loop, kept, t, h, wanted, disturbance, torque, network):
             smooth = _step(loop, begin, length, wanted, disturbance, torque, network)
         else:
             _within(wanted, disturbance, done / parts, size / parts, kept)
-            # The first try wrote torque and network output at the step's begin already.
+            # The first try wrote torque and network output at the step's start already.
             unused = loop.drive[1], loop.drive[2]
             smooth = _step(loop, begin, length, kept.wanted, kept.disturbance, unused[0], unused[1])
         if smooth or size == 1:
@@ -332,7 +332,7 @@ def _run(loop, kept, encoder, reference, disturbance, period, substeps, out):
             now = slice(at + 2 * i, at + 2 * i + 3)
             begin = k * period + i * h
             if i > 0:
-                # Results hold the torque at a sample's begin; later steps write to scratch.
+                # Results hold the torque at a sample's start; later steps write to scratch.
                 torque, network = drive[1], drive[2]
             _advance(loop, kept, begin, h, reference[now], disturbance[now], torque, network)
     return k + 1

@@ -107,7 +107,7 @@ def track(
     period, joints = settings.step_s, len(plant.joints)
     substeps = substeps_for(plant.assembly, feedback_gain, period)
     n = round(settings.duration_s / period) + 1
-    # A Runge-Kutta step reads its inputs at begin, middle and end.
+    # A Runge-Kutta step reads its inputs at start, middle and end.
     half_steps = np.arange(2 * (n - 1) * substeps + 1) * (0.5 * period / substeps)
     disturbance = settings.disturbance_nm * np.sin(settings.disturbance_rad_s * half_steps)
     wanted = np.stack(reference.at(half_steps), axis=1)

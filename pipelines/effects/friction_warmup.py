@@ -7,7 +7,7 @@ from pipelines.effects.kernel import reaction
 
 
 class FrictionWarmup(Effect):
-    """Viscous and Coulomb friction above their warm level, decaying from the run's begin."""
+    """Viscous and Coulomb friction above their warm level, decaying from the run's start."""
 
     name = "friction_warmup"
     title = "Friction warm-up"

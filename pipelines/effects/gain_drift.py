@@ -15,8 +15,8 @@ from pipelines.mechanics.motion import Motion
 class GainDrift(Effect):
     """A torque constant that falls as the magnets warm, or a sensor whose gain drifts.
 
-    The gain changes with the time since the run's begin, linearly or towards a limit, or with the
-    recorded temperature. It is 1 at the run's begin and at 25 °C; a temperature that was not
+    The gain changes with the time since the run's start, linearly or towards a limit, or with the
+    recorded temperature. It is 1 at the run's start and at 25 °C; a temperature that was not
     recorded counts as 25 °C.
     """
 

@@ -325,7 +325,7 @@ def swing_along(where, values, ratio, least, h, torque, inertia, damping, stiffn
 
     inertia twist'' + damping twist' + stiffness twist + spring(twist, twist') = torque. All but the
     spring are given by sample, and are linear between samples. The midpoint rule, linearised at
-    each step's begin, neither damps nor excites, and is stable however stiff the spring.
+    each step's start, neither damps nor excites, and is stable however stiff the spring.
 
     Parameters
     ----------
@@ -363,7 +363,7 @@ def swing_along(where, values, ratio, least, h, torque, inertia, damping, stiffn
             mass = max(least, inertia[n - 1] + share * (inertia[n] - inertia[n - 1]))
             drag = damping[n - 1] + share * (damping[n] - damping[n - 1])
             slope = stiffness[n - 1] + share * (stiffness[n] - stiffness[n - 1])
-            # The spring's tangent at the step's begin.
+            # The spring's tangent at the step's start.
             passed = kernel(twist, rate, values)
             per_twist = (kernel(twist + nudge, rate, values) - passed) / nudge
             per_rate = (kernel(twist, rate + nudge, values) - passed) / nudge

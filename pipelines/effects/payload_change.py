@@ -35,7 +35,7 @@ class PayloadChange(Effect):
     )
     shape = (
         Parameter(
-            "time", "s", "when it is added, from the run's begin", "t0", (0.0, 120.0), per_run=True
+            "time", "s", "when it is added, from the run's start", "t0", (0.0, 120.0), per_run=True
         ),
         Parameter(
             "distance", "m", "from the segment's joint to the mass", "r", (0.1, 0.45), default=0.3

@@ -296,7 +296,7 @@ class _Grid:
         """Return uniform times and the angles there; the samples themselves if they are uniform."""
         if self._uniform:
             return time, angle
-        # Counted from the stretch's begin, so that all windows use the same grid.
+        # Counted from the stretch's start, so that all windows use the same grid.
         first = int(np.ceil((time[0] - self._origin_s) * self._rate_hz))
         last = int((time[-1] - self._origin_s) * self._rate_hz)
         grid = self._origin_s + np.arange(first, last + 1) / self._rate_hz

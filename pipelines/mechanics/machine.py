@@ -135,7 +135,7 @@ def machine_of(
     geometry : Geometry
         Decides whether gravity acts.
     source : str, optional
-        Begin of the message.
+        Start of the message.
     scales : tuple of Scale, optional
         Scale of each joint.
 

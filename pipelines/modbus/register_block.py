@@ -84,8 +84,8 @@ class Block:
         """Return the block of one quantity."""
         return Block({name: self.registers[name]})
 
-    def span(self, name: str) -> float:
-        """Return the modulus of an unsigned register.
+    def modulus(self, name: str) -> float:
+        """Return the value at which an unsigned register wraps around to 0.
 
         Parameters
         ----------

@@ -24,7 +24,7 @@ def loop_panels(
     loops : sequence of DrawnTable
         ``simulation/1`` tables; one of another length than the first is left out.
     settled_after_s : float
-        Begin of the settled part, s, which determines the height of the errors.
+        Start of the settled part, s, which determines the height of the errors.
     """
     first = loops[0].rows
     # A loop of another length cannot share the chart's time.

@@ -188,8 +188,8 @@ class Drive(Device):
         """Return the values of a sample's registers by quantity, SI units."""
         j = self.joint
         return {
-            "sequence": sample.sequence[0] % (self.read.span("sequence") or 2**63),
-            "time": sample.time[0] % (self.read.span("time") or np.inf),
+            "sequence": sample.sequence[0] % (self.read.modulus("sequence") or 2**63),
+            "time": sample.time[0] % (self.read.modulus("time") or np.inf),
             "angle": sample.angle[0, j],
             "velocity": sample.velocity[0, j],
             # A drive reports a current; a client multiplies it by the same constants of the rig
@@ -213,5 +213,5 @@ class Sensor(Device):
     def show(self, sample: Samples) -> None:
         """Put a sample into the registers."""
         x, y, z = sample.forces[0, self.cuff]
-        sequence = sample.sequence[0] % (self.read.span("sequence") or 2**63)
+        sequence = sample.sequence[0] % (self.read.modulus("sequence") or 2**63)
         self._put(self.read, {"sequence": sequence, "force_x": x, "force_y": y, "force_z": z})

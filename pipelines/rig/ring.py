@@ -72,7 +72,7 @@ class Ring:
             ]
         if self.newest:
             start = self.newest.address - first
-            words = self.newest.encode({"newest": self.last % self.newest.span("newest")})
+            words = self.newest.encode({"newest": self.last % self.newest.modulus("newest")})
             registers[start : start + self.newest.count] = words
 
     def take(self) -> list[int]:

@@ -346,7 +346,7 @@ class RecordingSettings(Settings):
         for name in ("span", "span_s"):
             limits = getattr(self, name)
             if limits is not None and limits[0] >= limits[1]:
-                raise ValueError(f"{name}: found {list(limits)}, expected its begin before its end")
+                raise ValueError(f"{name}: found {list(limits)}, expected its start before its end")
         return self
 
     def is_of(self, file: Path) -> bool:

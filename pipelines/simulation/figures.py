@@ -42,7 +42,7 @@ def draw_tracking(
     limit_nm : float
         Torque limit to draw, N·m.
     settled_after_s : float
-        Begin of the settled part, s.
+        Start of the settled part, s.
     """
     loop = [DrawnTable("simulated", Role.AFTER, frame)]
     panels = [loop_panels(joint, loop, settled_after_s) for joint in joints]

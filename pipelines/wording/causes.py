@@ -34,7 +34,7 @@ def cause_in_words(cause: "Cause | Tie") -> str:
 def shares_in_words(causes: Iterable["Cause"]) -> dict[str, str]:
     """Return a verdict's causes and their ties in words, by label."""
     # The per-run variant of a cause may be its tie, and has its label: the cause comes last.
-    return {one.label: cause_in_words(one) for cause in causes for one in reversed(cause.alike)}
+    return {one.label: cause_in_words(one) for cause in causes for one in reversed(cause.with_ties)}
 
 
 def labels_in_words(text: str, labels: Iterable[str]) -> str:

@@ -20,6 +20,7 @@ from pipelines.contracts import (
     contract_of,
 )
 from pipelines.contracts import parquet as storage
+from pipelines.contracts.table import per_joint
 from pipelines.errors import ContractError
 
 
@@ -43,6 +44,19 @@ def test_what_is_written_is_read_again(tmp_path, swinging_leg, run_metadata):
     assert table.metadata == {**metadata, "contract": "recording/1"}
     assert table.stacked("angle").shape == (100, 2)
     assert contract_of(table.path) is RECORDING
+
+
+def test_a_motion_has_every_column_of_a_recording_by_the_same_description():
+    of_motion = {column.name: column for column in MOTION.columns}
+    for column in RECORDING.columns:
+        assert column.name in of_motion
+        if not column.required and column.name != "velocity":
+            assert of_motion[column.name] == column
+
+
+def test_a_column_of_a_quantity_without_a_unit_is_refused_where_it_is_declared():
+    with pytest.raises(ValueError, match=r"^voltage: has no unit; add it to QUANTITIES of"):
+        per_joint("voltage", "motor voltage")
 
 
 def test_unit_and_meaning_travel_with_the_column(tmp_path, swinging_leg, run_metadata):

@@ -24,8 +24,8 @@ from pipelines.diagnosis.fit.validation import ValidationResult
 from pipelines.diagnosis.judged_fit import JudgedFit
 from pipelines.diagnosis.selection.answer import answer_of
 from pipelines.diagnosis.selection.evidence import Element, Evidence, explained
-from pipelines.diagnosis.selection.look_alikes import kept_share
 from pipelines.diagnosis.selection.posterior import Posterior, posterior
+from pipelines.diagnosis.selection.unlisted_look_alikes import kept_share
 from pipelines.model import effect_named
 from tests.diagnosis.screening import Screening
 from tests.diagnosis.sessions import session

@@ -99,7 +99,7 @@ BAD_MAPS = [
     (
         'purpose = "train"',
         'purpose = "train"\nspan = [0.7, 0.2]',
-        "span: found [0.7, 0.2], expected its begin before",
+        "span: found [0.7, 0.2], expected its start before",
     ),
     (
         'purpose = "train"',

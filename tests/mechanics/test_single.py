@@ -5,7 +5,6 @@ import pytest
 from numpy.testing import assert_allclose
 from scipy.integrate import solve_ivp
 
-from pipelines.contracts.joint_units import UNITS, unit_at
 from pipelines.contracts.joints import Joint
 from pipelines.errors import InputError
 from pipelines.mechanics.geometry import Geometry
@@ -122,11 +121,3 @@ def test_only_machines_that_cannot_exist_are_reported(mechanism):
     X = np.array([2.0, 0.5, 0.1, 1.0])[: len(mechanism.parameters)]
     assert mechanism.unrealizable(X, EARTH) == []
     assert "is not positive" in mechanism.unrealizable(-X, EARTH)[0]
-
-
-def test_units_at_a_prismatic_joint_are_metres_and_newtons():
-    assert unit_at("prismatic", "N·m·s/rad") == "N·s/m"
-    assert unit_at("prismatic", "Hz") == "Hz"
-    assert all(
-        unit_at("revolute", unit) == unit and "rad/s" not in UNITS[unit].prismatic for unit in UNITS
-    )

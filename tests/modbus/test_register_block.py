@@ -7,7 +7,7 @@ from pydantic import ValidationError
 
 from pipelines.modbus.register_block import Block
 from pipelines.settings.rig import Register
-from pipelines.settings.rig.register import REGISTERS
+from pipelines.settings.rig.register import REGISTERS, STRUCT_CODES
 from pipelines.settings.rig.register_map import SensorMap
 
 patient = settings(deadline=None)  # a busy computer is no fault of a block's
@@ -26,6 +26,15 @@ INTEGERS = [name for name in REGISTERS if not name.startswith("float")]
 def test_each_integer_has_the_size_and_the_ends_of_its_name():
     registers = {kind: Register(address=0, type=kind) for kind in INTEGERS}
     assert {kind: (one.registers, *one.counts) for kind, one in registers.items()} == ENDS
+
+
+def test_a_new_type_of_fewer_bits_than_its_registers_has_the_ends_of_its_name(monkeypatch):
+    for kind, code, ends in (("uint24", "I", (0, 16777215)), ("int24", "i", (-8388608, 8388607))):
+        monkeypatch.setitem(REGISTERS, kind, 2)
+        monkeypatch.setitem(STRUCT_CODES, kind, code)
+        narrow = Register(address=0, type="uint32").model_copy(update={"type": kind})
+        assert narrow.counts == ends
+        assert Block({"x": narrow}).encode({"x": 1e9}) == [ends[1] >> 16, 0xFFFF], "it saturates"
 
 
 @pytest.mark.parametrize(
@@ -192,5 +201,5 @@ def test_an_unsigned_counter_wraps_after_its_span():
             "n": Register(address=2, type="int32"),
         }
     )
-    assert block.span("time") == pytest.approx(2**32 * 1e-6)
-    assert block.span("n") == 0.0
+    assert block.modulus("time") == pytest.approx(2**32 * 1e-6)
+    assert block.modulus("n") == 0.0

@@ -100,7 +100,7 @@ class Series:
         values = [one.decode(row)[name] for row in words.tolist()]
         if counts:
             # By the span of the register under test: another type wraps around elsewhere.
-            values = list(map(Unwrapper(one.span(name)), values))
+            values = list(map(Unwrapper(one.modulus(name)), values))
         return np.array(values)
 
     @property

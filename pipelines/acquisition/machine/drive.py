@@ -38,9 +38,9 @@ class Drive:
         self._status_block = Block({"status": self.map.read.status or self.map.read.sequence})
         self._heartbeat = 0
         has_heartbeat = self.map.write.heartbeat is not None
-        self._heartbeat_span = int(self.write_block.span("heartbeat")) if has_heartbeat else 1
-        self._unwrap_sequence = Unwrapper(self.read_block.span("sequence"))
-        self._unwrap_time = Unwrapper(self.read_block.span("time"))
+        self._heartbeat_span = int(self.write_block.modulus("heartbeat")) if has_heartbeat else 1
+        self._unwrap_sequence = Unwrapper(self.read_block.modulus("sequence"))
+        self._unwrap_time = Unwrapper(self.read_block.modulus("time"))
         self.bounds: Bounds | None = None
         """Updated with every reply, where the drive's sampling instants are of interest."""
         self.ring = self._make_ring(samples_per_cycle) if rig.sampling == "recorder" else None
@@ -59,7 +59,7 @@ class Drive:
     def _make_ring(self, samples_per_cycle: int) -> Ring | Queue:
         settings = self.map.ring
         assert settings  # the rig file is checked: with recorders, every drive has one
-        self._unwrap_ring_time = Unwrapper(Block(registers_of(settings.record)).span("time"))
+        self._unwrap_ring_time = Unwrapper(Block(registers_of(settings.record)).modulus("time"))
         if settings.fifo is not None:
             return Queue(self.device, settings, samples_per_cycle)
         return Ring(self.device, settings, self._note_newest, samples_per_cycle)

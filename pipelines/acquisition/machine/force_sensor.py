@@ -24,7 +24,7 @@ class Sensor:
         self._turn = rig.turn_of(settings)
         self._watchdog = Watchdog(rig.safety.watchdog_s)
         self._in_lockstep, self._reply_s = rig.clock == "lockstep", rig.safety.longest_reply_s
-        self._counter = Unwrapper(self.reader.block.span("sequence"))
+        self._counter = Unwrapper(self.reader.block.modulus("sequence"))
         self._first: tuple[float, float] | None = None
         """Count of its first sample, and when it came, host's clock, s."""
         self._last: tuple[float, float] | None = None

@@ -27,8 +27,8 @@ class Progress:
     def __init__(self, label: str, block: Block, rate_hz: float) -> None:
         """Follow a device with a label, whose counter is expected at a rate."""
         self._label, self._rate_hz = label, rate_hz
-        self._span = block.span("sequence")
-        self._clock_span = block.span("time") if "time" in block.names else 0.0
+        self._span = block.modulus("sequence")
+        self._clock_span = block.modulus("time") if "time" in block.names else 0.0
         self._first: Instant | None = None
         self._last: Instant | None = None
 

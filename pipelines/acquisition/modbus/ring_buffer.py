@@ -45,7 +45,7 @@ class Ring:
         self._note_newest = note_newest
         self._newest = Block({"newest": settings.newest})
         self._record = Block(registers_of(settings.record))
-        self._span = int(self._record.span("sequence"))
+        self._span = int(self._record.modulus("sequence"))
         self._function = settings.function
         self._address, self._capacity = settings.address, settings.capacity
         self._words = settings.words
@@ -143,7 +143,7 @@ class Queue:
         self._device = device
         self._address, self._words = settings.fifo, settings.words
         self._record = Block(registers_of(settings.record))
-        self._span = self._record.span("sequence")
+        self._span = self._record.modulus("sequence")
         self.block = settings.records_per_read
         self._reads = _most_reads(settings, samples_per_cycle)
         self._began: int | None = None

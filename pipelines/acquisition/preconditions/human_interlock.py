@@ -16,7 +16,7 @@ def unmonitored(rig: RigSettings) -> list[str]:
         missing.append(
             f"the rig file has no enabled_mask for the drive of {' and '.join(blind)}: an emergency"
             " stop that is pressed and released is noticed only by safety.following_error_rad"
-            f" ({rig.safety.with_human.following_error_rad or rig.safety.following_error_rad:g}"
+            f" ({rig.safety.in_force('with_human').following_error_rad:g}"
             " rad), by which the leg may leap on the release; add enabled_mask and enabled_value"
         )
     deaf = [drive.joint for drive in rig.drive if not rig.map.drive[drive.map].fault_mask]

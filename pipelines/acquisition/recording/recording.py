@@ -116,7 +116,7 @@ def _rate_and_duration(journal: JournalFile) -> tuple[float, float]:
 
 
 def _gaps(index: np.ndarray, rate_hz: float) -> list[tuple[float, int]]:
-    """Return time (s) and length of each gap between samples numbered (n,) from the run's begin."""
+    """Return time (s) and length of each gap between samples numbered (n,) from the run's start."""
     before = np.flatnonzero(np.diff(index) > 1)
     return [((int(index[k]) + 1) / rate_hz, int(index[k + 1] - index[k]) - 1) for k in before]
 

@@ -34,7 +34,7 @@ class Enabling:
         self._start: list[float] = []
         """Where the leg stood when the plan was made, (J,) rad."""
         self._silent_from_s: list[float] = []
-        """Since when each drive has not answered, s after the begin of enabling."""
+        """Since when each drive has not answered, s after the start of enabling."""
 
     def start_at(self, angles: Sequence[float]) -> None:
         """Enable the drives where the leg stands.

@@ -11,6 +11,7 @@ from pipelines.errors import DeviceError
 from pipelines.mechanics.motion import CUFFS
 from pipelines.settings.rig import RigSettings
 from pipelines.settings.rig.devices import DriveSettings, SensorSettings
+from pipelines.settings.rig.safety import SafetySettings
 
 HOLD_SAMPLES = 20
 """Samples for which a stopped drive holds before its torque is taken away."""
@@ -87,7 +88,7 @@ class Limits:
             if not isinstance(reading, Reading):
                 continue
             error = reading.angle - reference
-            allowed = self._rig.safety.following_error_rad + drive.speed_rad_s * late / self._rate
+            allowed = allowed_error_rad(self._rig.safety, drive, late / self._rate)
             if not abs(error) <= allowed:
                 return (
                     f"{drive.joint} angle {reading.angle:.3f} rad is {abs(error):.3f} rad from its"
@@ -133,6 +134,19 @@ class Limits:
                 if not abs(value) <= most:
                     return f"{cuff} force {axis} {value:.0f} N is above the limit of {most:g} N"
         return None
+
+
+def allowed_error_rad(safety: SafetySettings, drive: DriveSettings, late_s: float) -> float:
+    """Return how far a joint may be from its set-point, rad.
+
+    Parameters
+    ----------
+    safety, drive : SafetySettings, DriveSettings
+        With the limits in force.
+    late_s : float
+        Time in which the drive was sent nothing, so that it may have gone on, s.
+    """
+    return safety.following_error_rad + drive.speed_rad_s * late_s
 
 
 def sample_violation(

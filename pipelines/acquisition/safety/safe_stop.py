@@ -6,7 +6,7 @@ from numpy.typing import NDArray
 
 from pipelines.acquisition.machine.reading import Reading
 from pipelines.acquisition.safety.enable_state import EnableStates
-from pipelines.acquisition.safety.limits import HOLD_SAMPLES
+from pipelines.acquisition.safety.limits import HOLD_SAMPLES, allowed_error_rad
 from pipelines.acquisition.safety.sample_checks import SampleChecks
 from pipelines.acquisition.safety.set_point_tracker import SetPointTracker
 from pipelines.settings.rig.safety import SafetySettings
@@ -68,7 +68,7 @@ class SafeStop:
         """
         tracker = self._trackers[joint]
         error = reading.angle - tracker.base
-        allowed = self._safety.following_error_rad + tracker.drive.speed_rad_s * late / self._rate
+        allowed = allowed_error_rad(self._safety, tracker.drive, late / self._rate)
         # Latched: a leg that was let go of must not be held again.
         self.pressing |= not abs(reading.torque) <= tracker.drive.torque_nm
         self.pressing |= not abs(error) <= allowed

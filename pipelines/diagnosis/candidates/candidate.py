@@ -15,7 +15,7 @@ from pipelines.effects import EFFECTS, Effect, Parameter
 from pipelines.model import BASELINE, Term, TermColumns
 
 NEVER, ALWAYS = 1e6, -1e6
-"""s: onsets after every run's end and before every run's begin."""
+"""s: onsets after every run's end and before every run's start."""
 TURNS = ("1/turn", "rad/m")
 """Units of quantities that are counted along a joint's travel."""
 

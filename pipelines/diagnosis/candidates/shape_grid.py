@@ -207,6 +207,6 @@ def _rhythms(effect: Effect, runs: Sequence[Run], regression: DecisionRegression
 
 
 def _from_the_begin(effect: Effect, runs: int) -> Candidate:
-    """Return an effect with an onset, present from the begin on; its instants are sought later."""
+    """Return an effect with an onset, present from the start on; its instants are sought later."""
     defaults = [ALWAYS if p.per_run else p.default or 0.0 for p in effect.shape]
     return Candidate(effect, (tuple(defaults),) * runs)

@@ -224,7 +224,7 @@ class ShapeRefinement:
         return self.fit(candidate.with_own(at, onsets))
 
     def _only_in(self, candidate: Candidate, number: int) -> NDArray:
-        """Return the rows (N,) of a candidate that acts in one run only, from its begin on."""
+        """Return the rows (N,) of a candidate that acts in one run only, from its start on."""
         at, runs = candidate.onset, range(len(candidate.shapes))
         assert at is not None
         alone = candidate.with_own(at, [ALWAYS if k == number else NEVER for k in runs])

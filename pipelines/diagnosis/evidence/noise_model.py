@@ -147,7 +147,7 @@ def noise_model(runs: Sequence[Run], residuals: Sequence[NDArray]) -> NoiseModel
         for run, residual in zip(runs, residuals, strict=True)
     ]
     above = max(above_the_motion_hz(run) for run in runs)
-    # Highest begin of the band without periods, and its end, Hz.
+    # Highest start of the band without periods, and its end, Hz.
     latest, highest = 4.0, 8.0
     # Here the ratio of pink noise cannot be measured.
     fits = _spectra(runs, series, (min(above, latest), highest), pink=0.2)

@@ -16,7 +16,6 @@ from pipelines.diagnosis.evidence.residual_shares import ResidualShares, residua
 from pipelines.diagnosis.selection.answer import Answer, NamedCause, answer_of
 from pipelines.diagnosis.selection.evidence import Element, Evidence
 from pipelines.diagnosis.selection.findings import Finding, findings
-from pipelines.diagnosis.selection.look_alikes import with_look_alikes
 from pipelines.diagnosis.selection.posterior import (
     SURE,
     Posterior,
@@ -24,6 +23,7 @@ from pipelines.diagnosis.selection.posterior import (
     posterior,
     strongest,
 )
+from pipelines.diagnosis.selection.unlisted_look_alikes import with_look_alikes
 from pipelines.effects import EFFECTS
 from pipelines.errors import InputError
 

@@ -82,7 +82,7 @@ def _tracked(
 
 
 def _from_the_begin(term: Term) -> Term:
-    """Return a term whose onset is the run's begin, as the loop might end before it."""
+    """Return a term whose onset is the run's start, as the loop might end before it."""
     # Onsets are the only per-run values in seconds.
     onset = [p.per_run and p.unit == "s" for p in term.effect.fitted]
     return replace(term, values=np.where(onset, 0.0, term.values))

@@ -248,12 +248,12 @@ def _remains(d: Diagnosis, most: int) -> str:
 
 def _in_words(cause: Cause) -> str:
     """Return a cause, its ties, and their probability together, in words."""
-    alike = [in_words(effect_of_cause(one)) for one in cause.alike]
+    tied = [in_words(effect_of_cause(one)) for one in cause.with_ties]
     likely = f"{cause.probability:.2f}"
-    if len(alike) == 1:
-        return f"{alike[0]} (probability {likely})"
+    if len(tied) == 1:
+        return f"{tied[0]} (probability {likely})"
     # Largest number of tied causes in the summary; `indistinguishable_from` has all.
     mentioned = 3
-    more = [f"{len(alike) - mentioned} more"] if len(alike) > mentioned else []
-    *most, last = [*alike[:mentioned], *more]
+    more = [f"{len(tied) - mentioned} more"] if len(tied) > mentioned else []
+    *most, last = [*tied[:mentioned], *more]
     return f"{', '.join(most)} or {last}, which these data cannot separate (together {likely})"

@@ -5,7 +5,7 @@ from typing import Literal
 from pydantic import Field
 
 from pipelines.settings.base import Settings
-from pipelines.settings.rig.register import DIMENSION, Register
+from pipelines.settings.rig.register import DIMENSION, STRUCT_CODES, Register
 
 # "MODBUS application protocol specification" V1.1b3: FC03 and FC23 read 125, FC23 writes 121 at
 # most.
@@ -106,8 +106,9 @@ def check_counter(register: Register, name: str) -> None:
     ValueError
         It has a scale, an offset or a sign; names its place in the file.
     """
-    if not register.type.startswith("u") or (register.scale, register.offset) != (1.0, 0.0):
+    if not register.is_unsigned or (register.scale, register.offset) != (1.0, 0.0):
+        *others, last = (kind for kind, code in STRUCT_CODES.items() if code.isupper())
         raise ValueError(
             f"{name}: found {register.type} with scale {register.scale:g} and offset"
-            f" {register.offset:g}, expected uint16, uint32 or uint64 without scale or offset"
+            f" {register.offset:g}, expected {', '.join(others)} or {last} without scale or offset"
         )

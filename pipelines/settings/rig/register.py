@@ -22,7 +22,11 @@ STRUCT_CODES: dict[RegisterType, str] = {
     "float32": "f",
     "float64": "d",
 }
-"""Code of each type in Python's ``struct``; size, sign and range follow from it."""
+"""Code of each type in Python's ``struct``, which has its size and sign; a capital is unsigned.
+
+The number of bits is in the type's name, and may be less than that of its registers. A count of 24
+bits in two registers is read as one of 32, which is right if the device extends its sign.
+"""
 REGISTERS = {kind: struct.calcsize(f">{code}") // 2 for kind, code in STRUCT_CODES.items()}
 """Registers of 16 bits that a value takes."""
 
@@ -110,12 +114,17 @@ class Register(Settings):
         return 0.0 if self.counts is None else abs(self.si[0])
 
     @property
+    def is_unsigned(self) -> bool:
+        """Whether it is a count from 0, which wraps around."""
+        return STRUCT_CODES[self.type].isupper()
+
+    @property
     def counts(self) -> tuple[int, int] | None:
         """The least and the greatest count of an integer; None for a float."""
         if STRUCT_CODES[self.type] in "fd":
             return None
-        bits = 16 * self.registers
-        if self.type.startswith("u"):
+        bits = int(self.type.removeprefix("u").removeprefix("int"))
+        if self.is_unsigned:
             return 0, 2**bits - 1
         return -(2 ** (bits - 1)), 2 ** (bits - 1) - 1
 

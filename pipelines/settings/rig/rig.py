@@ -177,9 +177,8 @@ class RigSettings(Settings):
 
     def _check_set_points(self) -> None:
         """Refuse registers that cannot represent every set-point, or only too coarsely."""
-        following_rad = (
-            self.safety.with_human.following_error_rad or self.safety.following_error_rad
-        )
+        # With a wearer the limit is the tighter one.
+        following_rad = self.safety.in_force("with_human").following_error_rad
         for drive in self.drive:
             register, (low, high) = self.map.drive[drive.map].write.reference, drive.angle_rad
             if not register.holds(low, high):

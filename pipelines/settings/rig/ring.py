@@ -91,9 +91,9 @@ class RingSettings(ReadSettings):
                 f"newest: register {newest.address} is part of the ring itself; correct one address"
             )
         for name, register in (("newest", newest), ("record.sequence", self.record.sequence)):
-            span = 2 ** (16 * register.registers)
             # A record must keep its place in the ring when the counter wraps around.
-            if not register.type.startswith("u") or span % self.capacity:
+            counts = register.counts if register.is_unsigned else None
+            if counts is None or (counts[1] + 1) % self.capacity:
                 raise ValueError(
                     f"{name}.type: found {register.type} with a capacity of {self.capacity},"
                     " expected an unsigned counter and a power of 2"

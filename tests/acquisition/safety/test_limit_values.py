@@ -3,6 +3,8 @@
 import re
 from math import isnan, nan
 from pathlib import Path
+from types import SimpleNamespace
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
@@ -11,10 +13,12 @@ from pipelines.acquisition.machine.row import Answers
 from pipelines.acquisition.safety.limits import (
     HOLD_SAMPLES,
     Limits,
+    allowed_error_rad,
     clamped,
     refuse_leap,
     slowed,
 )
+from pipelines.acquisition.safety.safe_stop import SafeStop
 from pipelines.errors import DeviceError, Unanswered
 from pipelines.settings.rig import load_rig
 from tests.acquisition.safety.test_limits import RATE, reading, row
@@ -98,6 +102,17 @@ def test_a_joint_may_stray_by_the_following_error_and_what_it_goes_on_by(rig, la
     at_the_limit = row(**{name: {"angle": side * rig.safety.following_error_rad}})
     assert limits.straying(at_the_limit, [0.0, 0.0]) is None
     assert limits.straying(row(**{name: {"angle": nan}}), [0.0, 0.0]) is not None
+
+
+@pytest.mark.parametrize("late", [0, 3])
+def test_a_safe_stop_presses_from_the_error_on_at_which_a_run_is_stopped(rig, late):
+    allowed = allowed_error_rad(rig.safety, rig.drive[0], late / RATE)
+    tracker = SimpleNamespace(drive=rig.drive[0], base=0.0)
+    for error, presses in ((allowed, False), (allowed * BEYOND, True)):
+        stop = SafeStop(rig.safety, RATE, [tracker], Mock(), Mock())
+        stop.check(0, reading(angle=error), late)
+        stray = Limits(rig, RATE).straying(row(hip={"angle": error}), [0.0, 0.0], late)
+        assert (stop.pressing, stray is not None) == (presses, presses)
 
 
 def test_a_drive_that_did_not_answer_strays_from_nothing_and_the_other_is_judged(rig):

@@ -11,7 +11,7 @@ from scipy.optimize import minimize
 
 from pipelines.contracts.verdict import Named
 from pipelines.diagnosis.criteria import CRITERIA
-from pipelines.diagnosis.selection.look_alikes import kept_share
+from pipelines.diagnosis.selection.unlisted_look_alikes import kept_share
 from pipelines.model import effect_named
 from pipelines.wording.law import UNLISTED, family_of_kind, kind_and_joint
 from tests.campaigns.blind.scoring import names_of

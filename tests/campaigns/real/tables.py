@@ -65,7 +65,7 @@ def _verdict(title: str, d: Diagnosed) -> tuple[str, ...]:
 
 def _label(cause: Mapping[str, Any]) -> str:
     """Return a cause's label and those of what could stand in its place."""
-    effects = [effect_of_cause(one) for one in Cause.model_validate(cause).alike]
+    effects = [effect_of_cause(one) for one in Cause.model_validate(cause).with_ties]
     return " or ".join("per-run " * effect.each_run + effect.label for effect in effects)
 
 

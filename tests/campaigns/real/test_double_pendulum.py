@@ -115,7 +115,7 @@ def test_free_swings_show_rotor_and_zeros_and_every_run_is_predicted_better_than
 ):
     swings = diagnosed(LOGS["A0-swings"], real_data, tmp_path_factory.mktemp("A0-swings"))
     alike = [
-        {one.label for one in Cause.model_validate(cause).alike}
+        {one.label for one in Cause.model_validate(cause).with_ties}
         for cause in swings.verdict["causes"]
     ]
     # The first link hardly leaves the vertical: there a zero is an offset of the torque.

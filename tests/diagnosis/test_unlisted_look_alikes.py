@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from pipelines.diagnosis.selection.evidence import Element
-from pipelines.diagnosis.selection.look_alikes import kept_share, with_look_alikes
 from pipelines.diagnosis.selection.posterior import Posterior, posterior
+from pipelines.diagnosis.selection.unlisted_look_alikes import kept_share, with_look_alikes
 from tests.diagnosis.naming import naming
 from tests.diagnosis.test_posterior import CRITERIA as OF_PROBLEM
 from tests.diagnosis.test_posterior import cause, problem
