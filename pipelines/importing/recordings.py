@@ -73,7 +73,8 @@ def recordings(
             f"{map_path}: no [[recording]] matches {path.name}, only {patterns}; add one"
         )
     with about(path):
-        source = open_run(path, settings.source, settings.time.column)
+        own_clocks = [reading.time for _, reading in settings.readings() if reading.time]
+        source = open_run(path, settings.source, settings.time.column, own_clocks)
         log = read_log(source, settings, map_path)
         # A bag is a folder; the order makes its list of hashes the same on every system.
         of_bag = sorted(file for file in path.iterdir() if file.is_file()) if path.is_dir() else []
