@@ -294,3 +294,11 @@ def test_lists_next_to_names_in_changing_order_are_read_by_the_names(read):
     _, columns = read([json.dumps(record(k)) for k in range(100)], "log.jsonl")
     assert_allclose(columns["q.hip"], np.arange(100))
     assert_allclose(columns["q.knee"], -np.arange(100))
+
+
+def test_a_date_and_one_number_are_a_row(read):
+    """As in a file of one quantity, one of several of a run."""
+    rows = [f"2026-01-31 12:00:{k:02}.5;{0.5 * k}" for k in range(60)]
+    source, columns = read(["started;2026-01-31", "stamp;torque", *rows])
+    assert source.names == ("stamp", "torque")
+    assert_allclose(columns["torque"], 0.5 * np.arange(60))
