@@ -48,6 +48,8 @@ class TimeGuess:
     plus_unit: str = "ns"
     rivals: tuple[str, ...] = ()
     """Other clocks of the log, with other times."""
+    is_slowest: bool = False
+    """Whether it is the slowest of several clocks, and each other channel has its own."""
 
     @property
     def columns(self) -> list[str]:
@@ -375,7 +377,12 @@ def write_time(proposal: Proposal, guess: TimeGuess, held: Sequence[str]) -> Non
         why += ", but starts over"
     if not guess.sure:
         why += ", as no other does"
-    if guess.rivals:
+    if guess.is_slowest:
+        why += ", the slowest clock of an angle or torque"
+        if guess.rivals:
+            others = " and ".join(guess.rivals)
+            why += f"; set time_offset_s at the channels of {others} if they did not begin together"
+    elif guess.rivals:
         why += f", and so does {' and '.join(guess.rivals)}: name it as `time` of its channels"
         why += ", with time_offset_s if they did not begin together, and let the slowest be [time]"
     proposal.key("column", guess.column, why, guess.sure and not guess.rivals)
