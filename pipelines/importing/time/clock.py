@@ -315,11 +315,7 @@ def runs(time_s: NDArray, raw: NDArray, count_s: float, note: Note = unnoted) ->
     rows = _without_outliers(rows, time_s, note)
     begins = _begins(time_s[rows])
     _check_fractions(raw[rows], begins[1:])
-    for k in begins[1:]:
-        back = time_s[rows[k - 1]] - time_s[rows[k]]
-        seen = f"clock starts over at row {rows[k]}, {back:.6g} s back"
-        step = period(time_s[rows]) / count_s
-        note(seen, _if_full(float(raw[rows[k - 1]]), float(raw[rows[k]]), step, count_s))
+    _note_restarts(rows, begins[1:], time_s, raw, count_s, note)
     parts = [_ordered(part, time_s) for part in np.split(rows, begins[1:])]
     return [run for run in parts if len(run) > 1]
 
@@ -460,11 +456,29 @@ def _in_counts(seconds: float, count_s: float) -> float:
     return float(f"{seconds / count_s:.12g}")
 
 
-def _if_full(before: float, after: float, step: float, count_s: float) -> str:
-    full = full_clock(before, after, step, count_s)
-    if full is None:
-        return "another run begins"
-    return f"after {before:.10g}: if it was full, set time.wraps_at = {full:.12g}"
+def _note_restarts(
+    rows: NDArray,
+    begins: Sequence[int],
+    time_s: NDArray,
+    raw: NDArray,
+    count_s: float,
+    note: Note,
+) -> None:
+    """Report where a clock starts over: of times with one remedy, how many and the first."""
+    step = period(time_s[rows]) / count_s
+    by_modulus: dict[float | None, list[int]] = {}
+    for k in begins:
+        full = full_clock(float(raw[rows[k - 1]]), float(raw[rows[k]]), step, count_s)
+        by_modulus.setdefault(full, []).append(k)
+    for full, places in by_modulus.items():
+        first = places[0]
+        back = time_s[rows[first - 1]] - time_s[rows[first]]
+        times = "" if len(places) == 1 else f" {len(places)} times, the first"
+        action = "another run begins" if len(places) == 1 else "each time another run begins"
+        if full is not None:
+            before = float(raw[rows[first - 1]])
+            action = f"after {before:.10g}: if it was full, set time.wraps_at = {full:.12g}"
+        note(f"clock starts over{times} at row {rows[first]}, {back:.6g} s back", action)
 
 
 def _ordered(rows: NDArray, time_s: NDArray) -> Run:
