@@ -263,6 +263,44 @@ def test_a_factor_in_a_name_is_given_with_the_keys_to_set(guessed, pendulum, wri
     assert "its name says '0.1 Nm': set unit and scale" in doubts["joint[0].torque.unit"]
 
 
+def test_a_unit_that_no_map_has_is_quoted_and_no_joints_name(guessed, pendulum, write_csv):
+    columns = {
+        "time": pendulum.time,
+        "phi [gon]": 200.0 / np.pi * pendulum.angle,
+        "M [oz-in]": 141.6 * pendulum.torque,
+    }
+    text, doubts = guessed(write_csv(columns))
+    assert tomllib.loads(text)["joint"][0]["name"] == "joint"
+    assert "its name says 'gon'" in doubts["joint[0].angle.unit"]
+    assert "its name says 'oz-in'" in doubts["joint[0].torque.unit"]
+
+
+@pytest.mark.parametrize("begin", ["2026-03-04 12:00:00", "2026-03-04 23:59:57"])
+def test_a_time_of_day_and_its_milliseconds_are_proposed_together(
+    imported, guessed, pendulum, write_csv, begin
+):
+    """As FactoryTalk writes them: Date, Time and Millitm."""
+    stamps = pd.Timestamp(begin) + pd.to_timedelta(pendulum.time, unit="s")
+    columns = {
+        "Date": stamps.strftime("%m/%d/%Y"),
+        "Time": stamps.strftime("%H:%M:%S"),
+        "Millitm": stamps.microsecond // 1000,
+        "angle": pendulum.angle,
+        "torque": pendulum.torque,
+    }
+    path = write_csv(columns)
+    text, doubts = guessed(path)
+    assert tomllib.loads(text)["time"] == {
+        "column": "Time",
+        "unit": "iso8601",
+        "plus": "Millitm",
+        "plus_unit": "ms",
+    }
+    assert not any(key.startswith("time.") for key in doubts)
+    frame = imported(path, map_text=text).recording("log_train").frame
+    assert_allclose(frame["time_s"], pendulum.time[: len(frame)], atol=1e-9)
+
+
 def ended(values):
     """Every fourth value in the first rows, and no others."""
     return [*map(str, values[::4]), *[""] * (len(values) - len(values[::4]))]
