@@ -1,6 +1,7 @@
 """A log with the columns that a map names: the runs of its clock, and its quantities."""
 
-from collections.abc import Iterator, Sequence
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TypeVar
@@ -212,13 +213,13 @@ def read_log(source: Source, settings: ImportMap, map_path: Path) -> Log:
                 f"has {name!r} twice, which {where} in {map_path} names; name {name}#1, {name}#2"
                 " ... in the map, or rename one in the file"
             )
-        if name not in source.names:
+        if source.column_named(name) not in source.names:
             # Names that were numbered for want of a header explain the most.
             reason = "; ".join(source.remarks) or _similar(name, source.names)
             raise SettingsError(
                 f"has no column {name!r}, which {where} in {map_path} names; {reason}"
             )
-    columns = source.load(list(needed))
+    columns = _loaded(needed, source)
     findings = [Finding("rows", remark, "") for remark in source.remarks]
     note = noting("time", findings)
     if settings.time.column is None:
@@ -247,6 +248,20 @@ def read_log(source: Source, settings: ImportMap, map_path: Path) -> Log:
     time_s = clock.seconds(stamps, origin, settings.time, note)
     runs = tuple(clock.runs(time_s, stamps, settings.time.count_s, note))
     return Log(source, settings.time, channels, columns, origin, len(stamps), runs, findings)
+
+
+def _loaded(needed: Mapping[str, str], source: Source) -> Columns:
+    """Return the columns by their names in the map."""
+    columns = {name: source.column_named(name) for name in needed}
+    for column, times in Counter(columns.values()).items():
+        if times > 1:
+            names = [name for name, one in columns.items() if one == column]
+            places = " and ".join(needed[name] for name in names)
+            raise SettingsError(
+                f"the columns {', '.join(names)} in the map are one, of {places}; correct one"
+            )
+    loaded = source.load(list(columns.values()))
+    return {name: loaded[column] for name, column in columns.items()}
 
 
 def _similar(name: str, names: Sequence[str]) -> str:
@@ -295,7 +310,8 @@ def _clock(reading: ReadingSettings, where: str, settings: ImportMap, source: So
     """Return the clock of a reading: of the map, or else of the file, if it is not the log's."""
     if reading.time is not None or settings.time.column is None:
         return reading.time
-    own = {source.clocks.get(name) for name in columns_of(reading, where)} - {None}
+    columns = (source.column_named(name) for name in columns_of(reading, where))
+    own = {source.clocks.get(name) for name in columns} - {None}
     if len(own) > 1:
         names = ", ".join(sorted(map(str, own)))
         raise SettingsError(f"{where}.expression: mixes columns of the clocks {names}; use one")

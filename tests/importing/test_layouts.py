@@ -362,6 +362,19 @@ def test_an_array_of_structs_is_signals_by_their_names(pendulum, tmp_path):
     assert source.clocks[names[2]] == "logsout.Elements.tau.Values.Time"
 
 
+def test_a_signal_of_an_array_of_structs_may_be_named_by_its_place(imported, pendulum, tmp_path):
+    """``exp.Y.Data[0]`` is the first signal, as in MATLAB's ``exp.Y(1).Data``."""
+    signals = [(name, values[np.newaxis]) for name, values in pendulum.columns().items()]
+    scipy.io.savemat(tmp_path / "log.mat", {"exp": {"Y": structs(["Name", "Data"], signals)}})
+    text = MAP
+    for place, name in enumerate(pendulum.columns()):
+        text = text.replace(f'"{name}"', f'"exp.Y.Data[{place}]"')
+    frame = imported(tmp_path / "log.mat", map_text=text).recording().frame
+    assert_allclose(frame["pivot_torque_nm"], pendulum.torque)
+    twice = imported(tmp_path / "log.mat", map_text=text.replace("Data[3]", "angle"))
+    assert twice.code == 2 and "exp.Y.Data[1], exp.Y.angle in the map are one" in twice.err
+
+
 def test_joints_of_a_record_keep_their_names_when_their_order_changes(read):
     def joints(k):
         both = [{"name": "hip", "pos": k, "eff": 2 * k}, {"name": "knee", "pos": -k, "eff": 0}]
