@@ -1,8 +1,10 @@
 """A log with the columns that a map names: the runs of its clock, and its quantities."""
 
-from collections.abc import Iterator, Sequence
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +20,8 @@ from pipelines.settings import transmission
 from pipelines.settings.import_map import ImportMap, ReadingSettings, TimeSettings
 from pipelines.signals.sampling import between_samples, sample_rate
 from pipelines.validation.suggestion import suggestion
+
+Reading = TypeVar("Reading", bound=ReadingSettings)
 
 
 @dataclass(frozen=True)
@@ -146,7 +150,8 @@ class Log:
         reading, of_time = channel.reading, noting("time", findings)
         own_clock = reading.clock(self.settings)
         where = f"{channel.where}.time: {column!r}"
-        stamps = clock.stamps(self.columns[column], column, own_clock, of_time)
+        key = f"{channel.where}.time_unit"
+        stamps = clock.stamps(self.columns[column], column, own_clock, of_time, key=key)
         columns = {name: self.columns[name] for name in columns_of(reading, channel.where)}
         if {len(values) for values in columns.values()} - {1, len(stamps)}:
             raise InputError(f"{channel.where} and its clock {column!r} differ in length")
@@ -170,9 +175,14 @@ class Log:
         time, samples = own[0].time_s + own[0].began_s + ahead_s, values[known][own[0].rows]
         at = run.began_s + run.time_s
         if time[-1] < at[0] or time[0] > at[-1]:
+            together_s = at[0] - time[0] + reading.time_offset_s
+            cause = "correct its time_unit"
+            if own_clock.is_written != self.settings.is_written:
+                cause = "dates and plain numbers have no common origin"
             raise InputError(
                 f"{where} runs from {time[0]:.6g} to {time[-1]:.6g} s, the log from {at[0]:.6g} to"
-                f" {at[-1]:.6g} s; correct its time_unit, or set its time_offset_s"
+                f" {at[-1]:.6g} s; {cause}, or set its time_offset_s"
+                f" ({together_s:.13g} if both began together)"
             )
         seen = f"sampled at {sample_rate(time):.4g} Hz by a clock of its own ({column})"
         note(seen, "interpolated linearly, not across its gaps")
@@ -203,13 +213,13 @@ def read_log(source: Source, settings: ImportMap, map_path: Path) -> Log:
                 f"has {name!r} twice, which {where} in {map_path} names; name {name}#1, {name}#2"
                 " ... in the map, or rename one in the file"
             )
-        if name not in source.names:
+        if source.column_named(name) not in source.names:
             # Names that were numbered for want of a header explain the most.
             reason = "; ".join(source.remarks) or _similar(name, source.names)
             raise SettingsError(
                 f"has no column {name!r}, which {where} in {map_path} names; {reason}"
             )
-    columns = source.load(list(needed))
+    columns = _loaded(needed, source)
     findings = [Finding("rows", remark, "") for remark in source.remarks]
     note = noting("time", findings)
     if settings.time.column is None:
@@ -240,6 +250,20 @@ def read_log(source: Source, settings: ImportMap, map_path: Path) -> Log:
     return Log(source, settings.time, channels, columns, origin, len(stamps), runs, findings)
 
 
+def _loaded(needed: Mapping[str, str], source: Source) -> Columns:
+    """Return the columns by their names in the map."""
+    columns = {name: source.column_named(name) for name in needed}
+    for column, times in Counter(columns.values()).items():
+        if times > 1:
+            names = [name for name, one in columns.items() if one == column]
+            places = " and ".join(needed[name] for name in names)
+            raise SettingsError(
+                f"the columns {', '.join(names)} in the map are one, of {places}; correct one"
+            )
+    loaded = source.load(list(columns.values()))
+    return {name: loaded[column] for name, column in columns.items()}
+
+
 def _similar(name: str, names: Sequence[str]) -> str:
     """Suggest a column in the place of one that is missing."""
     # Within its own group, as other groups may have columns of nearly the same name.
@@ -252,29 +276,42 @@ def _channels(settings: ImportMap, source: Source) -> Iterator[Channel]:
     for i, joint in enumerate(settings.joint):
         for name, reading in joint.readings():
             gain = reading.gain(transmission.dimension_at(joint.kind, name))
+            time = _clock(reading, f"joint[{i}].{name}", settings, source)
             yield Channel(
                 joint.joint.column(name),
                 f"joint[{i}].{name}",
-                reading,
+                _with_clock(reading, time, settings),
                 gain,
                 # The equation of motion needs both; other channels may be blank in some rows.
                 required=name in ("angle", "torque"),
                 # While a drive is off only its torque is no measurement; the encoder still is one.
                 enabled=joint.enabled if name == "torque" else None,
-                time=_clock(reading, f"joint[{i}].{name}", settings, source),
+                time=time,
                 turns=joint.turns and name in ("angle", "reference"),
             )
     for i, force in enumerate(settings.force):
         where = f"force[{i}]"
         clock_of = _clock(force, where, settings, source)
+        force = _with_clock(force, clock_of, settings)
         yield Channel(force.target, where, force, 1.0, required=False, time=clock_of)
+
+
+def _with_clock(reading: Reading, time: str | None, settings: ImportMap) -> Reading:
+    """Return a reading with what the map says of its clock, if only at another channel."""
+    keys = ("time_unit", "time_scale", "time_offset_s")
+    of_clock = (one for _, one in settings.readings() if one.time is not None and one.time == time)
+    other = next((one for one in of_clock if one.model_fields_set & set(keys)), None)
+    if other is None or reading.model_fields_set & set(keys):
+        return reading
+    return reading.model_copy(update={key: getattr(other, key) for key in keys})
 
 
 def _clock(reading: ReadingSettings, where: str, settings: ImportMap, source: Source) -> str | None:
     """Return the clock of a reading: of the map, or else of the file, if it is not the log's."""
     if reading.time is not None or settings.time.column is None:
         return reading.time
-    own = {source.clocks.get(name) for name in columns_of(reading, where)} - {None}
+    columns = (source.column_named(name) for name in columns_of(reading, where))
+    own = {source.clocks.get(name) for name in columns} - {None}
     if len(own) > 1:
         names = ", ".join(sorted(map(str, own)))
         raise SettingsError(f"{where}.expression: mixes columns of the clocks {names}; use one")

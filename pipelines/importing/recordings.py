@@ -21,7 +21,7 @@ from pipelines.importing.sanity import plausibility
 from pipelines.importing.sources.joined import open_run, parts_of
 from pipelines.importing.time import held
 from pipelines.importing.time.clock import FASTEST_HZ, SLOWEST_HZ, Run, Sampling
-from pipelines.importing.time.period import repeats_after
+from pipelines.importing.time.period import better_period, repeats_after
 from pipelines.settings.import_map import ImportMap, RecordingSettings
 
 FEWEST = 10
@@ -73,7 +73,8 @@ def recordings(
             f"{map_path}: no [[recording]] matches {path.name}, only {patterns}; add one"
         )
     with about(path):
-        source = open_run(path, settings.source, settings.time.column)
+        own_clocks = [reading.time for _, reading in settings.readings() if reading.time]
+        source = open_run(path, settings.source, settings.time.column, own_clocks)
         log = read_log(source, settings, map_path)
         # A bag is a folder; the order makes its list of hashes the same on every system.
         of_bag = sorted(file for file in path.iterdir() if file.is_file()) if path.is_dir() else []
@@ -164,6 +165,7 @@ def _recordings_of(
     findings += _turns_apart(f"{path.name}{suffix}", columns, log.turns, begins)
     spans = [_span(time, float(run.time_s[-1]), recording) for recording in wanted]
     _check_overlap(time, wanted, spans)
+    findings += _wrong_periods(columns, settings, wanted, spans)
     for recording, rows in zip(wanted, spans, strict=True):
         own = {name: values[rows] for name, values in columns.items()}
         # Rate and gaps of the span itself, as a logger's rate may change during a run.
@@ -239,13 +241,42 @@ def _note_period(
     """Report a period that the map lacks, by which noise is separated from systematic errors."""
     if all(recording.period_s is not None for recording in wanted):
         return
-    names = [joint.joint.column("reference") for joint in settings.joint]
-    if not all(name in columns for name in names):
-        names = [joint.joint.column("angle") for joint in settings.joint]
-    period_s = repeats_after(columns["time_s"], np.column_stack([columns[name] for name in names]))
+    period_s = repeats_after(columns["time_s"], _motion(columns, settings))
     if period_s is not None:
         seen = f"the motion repeats every {period_s:.6g} s, but the map has no period_s"
         note(seen, f"set period_s = {period_s:.6g} in [[recording]] for exoid diagnose")
+
+
+def _motion(columns: Mapping[str, NDArray], settings: ImportMap) -> NDArray:
+    """Return the set-points of all joints, else their angles, (n, k)."""
+    names = [joint.joint.column("reference") for joint in settings.joint]
+    if not all(name in columns for name in names):
+        names = [joint.joint.column("angle") for joint in settings.joint]
+    return np.column_stack([columns[name] for name in names])
+
+
+def _wrong_periods(
+    columns: Mapping[str, NDArray],
+    settings: ImportMap,
+    wanted: Sequence[RecordingSettings],
+    spans: Sequence[slice],
+) -> Iterator[Finding]:
+    """Report periods of the map after which the motion does not repeat, but after another."""
+    motion = _motion(columns, settings)
+    for recording, rows in zip(wanted, spans, strict=True):
+        if recording.period_s is None:
+            continue
+        better_s = better_period(columns["time_s"][rows], motion[rows], recording.period_s)
+        if better_s is not None:
+            seen = (
+                f"the motion to {recording.purpose} repeats every {better_s:.6g} s, but not after"
+                f" the {recording.period_s:.6g} s of the map's period_s"
+            )
+            action = (
+                f"kept, but differences between periods are taken for noise: set period_s ="
+                f" {better_s:.6g}"
+            )
+            yield Finding("time", seen, action)
 
 
 def _check_values(columns: Mapping[str, NDArray], settings: ImportMap) -> None:

@@ -71,6 +71,20 @@ def test_a_constant_angle_is_reported_as_constant(motions):
     )
 
 
+@pytest.mark.parametrize("shake", [0.0, 1e-6])
+def test_a_joint_that_rests_in_the_only_validation_run_is_not_to_leave_the_map(motions, shake):
+    """It moves in the training runs; the way out is another run to validate on."""
+    angle = -0.5 + shake * (np.arange(len(motions[0])) % 2)
+    only = [m for m in motions if m.purpose != "validate"]
+    resting = next(m for m in motions if m.purpose == "validate" and m.run == "exo_alone")
+    resting = replace(standing_knee(resting, angle[: len(resting)]))
+    with pytest.raises(
+        InputError, match=r"or validate on a run in which it moves, as in run_0"
+    ) as e:
+        diagnose([imported(m) for m in (*only, resting)])
+    assert "out of the map" not in str(e.value)
+
+
 @pytest.mark.parametrize(
     ("value", "remedy"),
     [(0.0, '; a joint without a drive has drive = "none"'), (-3.2, "")],

@@ -94,6 +94,13 @@ def test_a_clock_that_starts_over_keeps_the_longest_run(imported, pendulum, writ
     assert "2 runs; rows 600-2599 kept, 600 left out" in outcome.printed
 
 
+def test_many_restarts_of_a_clock_are_one_line(imported, pendulum, write_csv):
+    columns = joined(*[cut(pendulum.columns(), slice(0, 300))] * 4, pendulum.columns())
+    printed = imported(write_csv(columns)).printed
+    assert "clock starts over 4 times, the first at row 300, 1.495 s back" in printed
+    assert printed.count("starts over") == 1
+
+
 def test_a_clock_that_starts_over_can_be_split_into_runs(imported, pendulum, write_csv):
     columns = joined(cut(pendulum.columns(), slice(0, 600)), pendulum.columns())
     outcome = imported(

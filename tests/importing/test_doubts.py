@@ -263,23 +263,89 @@ def test_a_factor_in_a_name_is_given_with_the_keys_to_set(guessed, pendulum, wri
     assert "its name says '0.1 Nm': set unit and scale" in doubts["joint[0].torque.unit"]
 
 
-def test_a_channel_with_values_in_the_rows_of_a_clock_has_that_clock(guessed, pendulum, write_csv):
-    """Two devices in one table, the slower one with fewer rows."""
-    slow = len(pendulum.time) // 4
-
-    def ended(values):
-        return [*map(str, values[::4]), *[""] * (len(values) - slow)]
-
+def test_a_unit_that_no_map_has_is_quoted_and_no_joints_name(guessed, pendulum, write_csv):
     columns = {
-        "enc_time_s": ended(pendulum.time),
-        "enc_angle_rad": ended(pendulum.angle),
-        "daq_time_s": pendulum.time,
-        "daq_torque_Nm": pendulum.torque,
+        "time": pendulum.time,
+        "phi [gon]": 200.0 / np.pi * pendulum.angle,
+        "M [oz-in]": 141.6 * pendulum.torque,
     }
     text, doubts = guessed(write_csv(columns))
+    assert tomllib.loads(text)["joint"][0]["name"] == "joint"
+    assert "its name says 'gon'" in doubts["joint[0].angle.unit"]
+    assert "its name says 'oz-in'" in doubts["joint[0].torque.unit"]
+
+
+@pytest.mark.parametrize("begin", ["2026-03-04 12:00:00", "2026-03-04 23:59:57"])
+def test_a_time_of_day_and_its_milliseconds_are_proposed_together(
+    imported, guessed, pendulum, write_csv, begin
+):
+    """As FactoryTalk writes them: Date, Time and Millitm."""
+    stamps = pd.Timestamp(begin) + pd.to_timedelta(pendulum.time, unit="s")
+    columns = {
+        "Date": stamps.strftime("%m/%d/%Y"),
+        "Time": stamps.strftime("%H:%M:%S"),
+        "Millitm": stamps.microsecond // 1000,
+        "angle": pendulum.angle,
+        "torque": pendulum.torque,
+    }
+    path = write_csv(columns)
+    text, doubts = guessed(path)
+    assert tomllib.loads(text)["time"] == {
+        "column": "Time",
+        "unit": "iso8601",
+        "plus": "Millitm",
+        "plus_unit": "ms",
+    }
+    assert not any(key.startswith("time.") for key in doubts)
+    frame = imported(path, map_text=text).recording("log_train").frame
+    assert_allclose(frame["time_s"], pendulum.time[: len(frame)], atol=1e-9)
+
+
+def ended(values):
+    """Every fourth value in the first rows, and no others."""
+    return [*map(str, values[::4]), *[""] * (len(values) - len(values[::4]))]
+
+
+def blank(values):
+    """Every fourth value, and no others between."""
+    return ["" if row % 4 else str(value) for row, value in enumerate(values)]
+
+
+def held(values):
+    """Every fourth value, repeated until the next."""
+    return np.repeat(values[::4], 4)[: len(values)]
+
+
+@pytest.mark.parametrize("slow", [ended, blank, held])
+def test_of_two_clocks_in_one_table_the_slower_is_proposed(
+    imported, guessed, pendulum, write_csv, slow
+):
+    """Between the rows of the faster one, straight lines would make the angle rough."""
+    columns = {
+        "daq_time_s": pendulum.time,
+        "daq_torque_Nm": pendulum.torque,
+        "enc_time_s": slow(pendulum.time + 0.002),
+        "enc_angle_rad": slow(pendulum.angle),
+    }
+    path = write_csv(columns)
+    text, doubts = guessed(path)
+    assert tomllib.loads(text)["time"]["column"] == "enc_time_s"
     (joint,) = tomllib.loads(text)["joint"]
-    assert joint["angle"]["time"] == "enc_time_s"
-    assert "time_offset_s" in doubts["time.column"]
+    assert joint["torque"]["time"] == "daq_time_s" and "time" not in joint["angle"]
+    assert "time_offset_s at the channels of daq_time_s" in doubts["time.column"]
+    frame = imported(path, map_text=text).recording("log_train").frame
+    at_s = frame["time_s"].to_numpy() + 0.002
+    torque = np.interp(at_s, pendulum.time, pendulum.torque)
+    assert_allclose(frame["joint_torque_nm"], torque, atol=1e-9)
+
+
+def test_a_slower_clock_of_no_angle_or_torque_is_not_proposed(guessed, pendulum, write_csv):
+    columns = pendulum.columns() | {
+        "warm_time_s": held(pendulum.time + 0.002),
+        "motor temperature": held(20.0 + pendulum.angle),
+    }
+    time = tomllib.loads(guessed(write_csv(columns))[0])["time"]
+    assert time["column"] == "time"
 
 
 def test_the_sign_of_a_torque_is_unsure_where_its_column_is(guessed, pendulum, write_csv):

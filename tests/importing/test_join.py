@@ -64,9 +64,59 @@ def test_a_file_without_the_clock_is_refused(imported, pendulum, write_csv):
     write_csv({"t": pendulum.time, "torque": pendulum.torque}, name="run1_torque.csv")
     outcome = imported(paths[0], map_text=joined_map(*(path.name for path in paths)))
     assert outcome.code == 2
-    assert (
-        "run1_torque.csv: has no column 'time', the clock by which files are joined" in outcome.err
+    refusal = "run1_torque.csv: has no column 'time', the clock by which files are joined"
+    assert refusal in outcome.err and "set that as time of its channels" in outcome.err
+    write_csv({"t": pendulum.time, "angle": pendulum.angle}, name="run1_angle.csv")
+    outcome = imported(paths[0], map_text=joined_map(*(path.name for path in paths)))
+    assert outcome.err.count("run1_angle.csv:") == 1
+
+
+def dates_of(pendulum):
+    """The pendulum's times as durations (n,), to be added to a date."""
+    return np.round(1e6 * pendulum.time).astype("m8[us]")
+
+
+def with_clock(clock):
+    """The map whose velocity has a clock of another name, and whose torque is in its file."""
+    of_velocity = 'velocity = { column = "velocity", unit = "rad/s"'
+    return joined_map("run1_angle.csv", "run1_rest.csv").replace(
+        of_velocity, f"{of_velocity}, {clock}"
     )
+
+
+def test_files_whose_clocks_have_other_names_and_units_are_joined(imported, pendulum, write_csv):
+    """What the map says of the clock at one channel holds for all channels of its file."""
+    some = slice(None, None, 2)
+    angle = write_csv(
+        {"time": pendulum.time[some], "angle": pendulum.angle[some]}, "run1_angle.csv"
+    )
+    rest = {"t_ms": 1e3 * (pendulum.time + 2.0)}
+    rest |= {"velocity": pendulum.velocity, "torque": pendulum.torque}
+    write_csv(rest, "run1_rest.csv")
+    text = with_clock('time = "t_ms", time_unit = "ms", time_offset_s = -2.0')
+    outcome = imported(angle, map_text=text)
+    assert_allclose(outcome.recording().frame["pivot_torque_nm"], pendulum.torque[some], atol=1e-9)
+    assert "joined with run1_rest.csv by the clocks 'time', 't_ms'" in outcome.printed
+
+
+def test_dates_in_one_file_and_a_number_in_the_other_need_the_offset(imported, pendulum, write_csv):
+    dates = np.datetime64("2026-01-31T12:00:00", "us") + np.round(1e6 * pendulum.time).astype(
+        "m8[us]"
+    )
+    write_csv(
+        {"t": dates, "velocity": pendulum.velocity, "torque": pendulum.torque}, "run1_rest.csv"
+    )
+    angle = write_csv({"time": pendulum.time, "angle": pendulum.angle}, "run1_angle.csv")
+    refused = imported(angle, map_text=with_clock('time = "t"'))
+    assert refused.code == 2
+    assert "joint[0].torque.time_unit = 's'; set it to iso8601" in refused.err
+    refused = imported(angle, map_text=with_clock('time = "t", time_unit = "iso8601"'))
+    assert refused.code == 2
+    assert "dates and plain numbers have no common origin" in refused.err
+    assert "time_offset_s (-1769860800 if both began together)" in " ".join(refused.err.split())
+    clock = 'time = "t", time_unit = "iso8601", time_offset_s = -1769860800'
+    frame = imported(angle, map_text=with_clock(clock)).recording().frame
+    assert_allclose(frame["pivot_torque_nm"], pendulum.torque, atol=1e-6)
 
 
 def test_a_guess_joins_files_of_one_run(imported, pendulum, write_csv, capsys):
@@ -94,3 +144,34 @@ def test_a_guess_takes_the_slowest_clock(pendulum, write_csv, capsys):
     assert run(["import", str(torque), str(angle), "--guess"]) == 0
     guess = tomllib.loads(capsys.readouterr().out)
     assert guess["source"]["join"] == ["run1_angle.csv", "run1_torque.csv"]
+    assert guess["time"]["column"] == "time"
+    assert guess["joint"][0]["torque"]["time"] == "time#2"
+
+
+def test_a_guess_joins_files_whose_clocks_have_other_names_and_units(
+    imported, pendulum, write_csv, capsys
+):
+    """Dates in one and a number in the other are taken to begin together."""
+    dates = np.datetime64("2026-01-31T12:00:00", "us") + dates_of(pendulum)
+    in_ms = {"t_ms": 1e3 * pendulum.time}
+    for clock, keys in (
+        ({"stamp": dates}, {"time_unit": "iso8601", "time_offset_s": -1769860800.0}),
+        (in_ms, {"time_unit": "ms"}),
+    ):
+        torque = write_csv(clock | {"torque": pendulum.torque}, name="run1_torque.csv")
+        slow = {"time": pendulum.time[::3], "angle": pendulum.angle[::3]}
+        angle = write_csv(slow, name="run1_angle.csv")
+        assert run(["import", str(torque), str(angle), "--guess"]) == 0
+        text = capsys.readouterr().out
+        (joint,) = tomllib.loads(text)["joint"]
+        assert {key: joint["torque"].get(key) for key in keys} == keys
+        frame = imported(torque, map_text=text).recording("run1_angle_train").frame
+        rows = slice(None, 3 * len(frame), 3)
+        assert_allclose(frame["joint_torque_nm"], pendulum.torque[rows], atol=1e-6)
+
+
+def test_a_guess_does_not_join_files_of_two_machines(pendulum, write_csv, capsys):
+    one = write_csv({"time": pendulum.time, "angle": pendulum.angle, "torque": pendulum.torque})
+    other = {"t": pendulum.time, "pos": pendulum.angle, "current": pendulum.torque}
+    assert run(["import", str(one), str(write_csv(other, "other.csv")), "--guess"]) == 2
+    assert "guess its own map" in capsys.readouterr().err

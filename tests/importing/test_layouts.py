@@ -205,6 +205,94 @@ def test_labview_lvm_is_read_with_each_channels_clock(read, table):
     assert source.clocks["torque"] == "X_Value#2"
 
 
+def lvm(segments, decimal=".", x_columns="No"):
+    """A file of LabVIEW, of segments as (samples, date and time, X0, Delta_X, names, rows)."""
+
+    def written(value):
+        return str(value).replace(".", decimal)
+
+    yield from ("LabVIEW Measurement\t", "Separator\tTab", f"Decimal_Separator\t{decimal}")
+    yield from (f"X_Columns\t{x_columns}", "***End_of_Header***\t", "\t")
+    for samples, (date, time), starts, steps, names, rows in segments:
+        count = len(names)
+        tags = {"Samples": [samples] * count, "Date": [date] * count, "Time": [time] * count}
+        tags |= {"Y_Unit_Label": ["rad", "Nm"], "X0": starts, "Delta_X": steps}
+        yield f"Channels\t{count}\t"
+        for tag, values in tags.items():
+            yield "\t".join([tag, *map(written, values)]) + "\t"
+        yield "***End_of_Header***\t\t\t"
+        yield from ("***Start_Special***", "Notes\t1\t2", "***End_Special***")
+        yield "\t".join(["X_Value", *names, "Comment"])
+        yield from (f"\t{written(one)}\t{written(other)}" for one, other in rows)
+        yield ""
+
+
+DAY = ("2026/01/31", "12:00:00.1234567890123")
+
+
+@pytest.mark.parametrize("decimal", [".", ","])
+def test_labview_lvm_without_a_column_of_times_has_those_of_its_header(read, table, decimal):
+    """Segments go on by their X0, or else by their date and time."""
+    rows = [(row[1], row[3]) for row in table]
+    later = ("2026/01/31", "12:00:00.6234567890123")
+    step, names = ["0.01"] * 2, ("angle", "torque")
+    one = [(100, DAY, ["0.5", "0.5"], step, names, rows)]
+    by_x0 = [
+        (50, DAY, ["0.5"] * 2, step, names, rows[:50]),
+        (50, DAY, ["1.0"] * 2, step, names, rows[50:]),
+    ]
+    by_date = [
+        (50, DAY, ["0.5"] * 2, step, names, rows[:50]),
+        (50, later, ["0.5"] * 2, step, names, rows[50:]),
+    ]
+    for segments in (one, by_x0, by_date):
+        source, columns = read(list(lvm(segments, decimal)), "log.lvm")
+        assert list(columns) == ["X_Value", "angle", "torque"]
+        assert_allclose(columns["X_Value"], 0.5 + np.arange(100) / 100.0, atol=1e-6)
+        assert_allclose(columns["torque"], np.array(rows, dtype=float)[:, 1], atol=1e-12)
+        assert source.units == {"X_Value": "s", "angle": "rad", "torque": "Nm"}
+
+
+def test_labview_lvm_whose_channels_have_different_steps_has_a_clock_for_each(read, table):
+    rows = [(row[1], table[k][3] if k < 50 else "") for k, row in enumerate(table)]
+    segment = (100, DAY, ["0.0", "0.0"], ["0.01", "0.02"], ("angle", "torque"), rows)
+    source, columns = read(list(lvm([segment])), "log.lvm")
+    assert source.clocks == {"angle": "X_Value#1", "torque": "X_Value#2"}
+    known = np.isfinite(columns["torque"])
+    assert_allclose(columns["X_Value#2"][known], np.arange(50) / 50.0, atol=1e-12)
+
+
+def test_labview_lvm_whose_rows_were_written_one_by_one_has_no_clock(read, table):
+    rows = [(row[1], row[3]) for row in table]
+    names = ("angle", "torque")
+    source, columns = read(list(lvm([(1, DAY, [0, 0], [1, 1], names, rows)])), "log.lvm")
+    assert "X_Value" not in columns and "set time.rate_hz" in source.remarks[0]
+    source, columns = read(list(lvm([(50, DAY, [0, 0], [0.01] * 2, names, rows)])), "log.lvm")
+    assert "100 rows under a header for 50" in source.remarks[0]
+    assert_allclose(columns["X_Value"], np.arange(100) / 100.0, atol=1e-12)
+
+
+def test_segments_of_labview_lvm_with_a_column_of_times_follow_each_other(read, table):
+    """The times of a segment start over, and count from its own date."""
+    rows = [(row[1], row[3]) for row in table]
+    later = ("2026/01/31", "12:00:01.1234567890123")
+    segments = [(100, day, [0, 0], [0.01] * 2, ("angle", "torque"), rows) for day in (DAY, later)]
+    times = [row[0] for row in table] * 2
+    lines = list(lvm(segments, x_columns="One"))
+    inside = [k for k, line in enumerate(lines) if line.startswith("\t") and line.strip()]
+    for k, time in zip(inside, times, strict=True):
+        lines[k] = time + lines[k]
+    _, columns = read(lines, "log.lvm")
+    assert_allclose(columns["X_Value"], np.arange(200) / 100.0, atol=1e-6)
+
+
+def test_segments_of_labview_lvm_with_other_columns_are_refused(read, table):
+    rows = [(row[1], row[3]) for row in table]
+    segments = [(100, DAY, [0, 0], [0.01] * 2, names, rows) for names in (("q", "tau"), ("q", "i"))]
+    with pytest.raises(InputError, match="segments with different columns"):
+        read(list(lvm(segments)), "log.lvm")
+
+
 def test_a_json_log_whose_last_line_is_cut_loses_that_line(read):
     lines = [f'{{"t": {k}, "q": {k * k}}}' for k in range(20)]
     source, columns = read([*lines, '{"t": 20, "q"'], "log.json")
@@ -274,6 +362,19 @@ def test_an_array_of_structs_is_signals_by_their_names(pendulum, tmp_path):
     assert source.clocks[names[2]] == "logsout.Elements.tau.Values.Time"
 
 
+def test_a_signal_of_an_array_of_structs_may_be_named_by_its_place(imported, pendulum, tmp_path):
+    """``exp.Y.Data[0]`` is the first signal, as in MATLAB's ``exp.Y(1).Data``."""
+    signals = [(name, values[np.newaxis]) for name, values in pendulum.columns().items()]
+    scipy.io.savemat(tmp_path / "log.mat", {"exp": {"Y": structs(["Name", "Data"], signals)}})
+    text = MAP
+    for place, name in enumerate(pendulum.columns()):
+        text = text.replace(f'"{name}"', f'"exp.Y.Data[{place}]"')
+    frame = imported(tmp_path / "log.mat", map_text=text).recording().frame
+    assert_allclose(frame["pivot_torque_nm"], pendulum.torque)
+    twice = imported(tmp_path / "log.mat", map_text=text.replace("Data[3]", "angle"))
+    assert twice.code == 2 and "exp.Y.Data[1], exp.Y.angle in the map are one" in twice.err
+
+
 def test_joints_of_a_record_keep_their_names_when_their_order_changes(read):
     def joints(k):
         both = [{"name": "hip", "pos": k, "eff": 2 * k}, {"name": "knee", "pos": -k, "eff": 0}]
@@ -294,3 +395,11 @@ def test_lists_next_to_names_in_changing_order_are_read_by_the_names(read):
     _, columns = read([json.dumps(record(k)) for k in range(100)], "log.jsonl")
     assert_allclose(columns["q.hip"], np.arange(100))
     assert_allclose(columns["q.knee"], -np.arange(100))
+
+
+def test_a_date_and_one_number_are_a_row(read):
+    """As in a file of one quantity, one of several of a run."""
+    rows = [f"2026-01-31 12:00:{k:02}.5;{0.5 * k}" for k in range(60)]
+    source, columns = read(["started;2026-01-31", "stamp;torque", *rows])
+    assert source.names == ("stamp", "torque")
+    assert_allclose(columns["torque"], 0.5 * np.arange(60))

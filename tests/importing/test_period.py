@@ -8,7 +8,7 @@ import pytest
 from scipy.signal import butter, sosfilt
 
 from exoid_cli.app import run
-from pipelines.importing.time.period import repeats_after
+from pipelines.importing.time.period import better_period, repeats_after
 
 
 def multisine(rng, time, period, joints=2):
@@ -87,6 +87,28 @@ def test_rest_repeats_nothing_and_neither_does_less_than_two_periods():
     assert repeats_after(time, once[:, np.newaxis]) is None
 
 
+@pytest.mark.parametrize("seed", range(6))
+def test_a_period_by_a_factor_too_long_is_told_from_the_right_one_and_its_multiples(seed):
+    rng = np.random.default_rng(seed)
+    period = rng.choice([4.0, 7.3, 10.0])
+    time = np.arange(0.0, rng.uniform(4.0, 6.0) * period, 0.02)
+    angle = multisine(rng, time, period) * np.minimum(time, 1.0)[:, np.newaxis]
+    angle += 0.01 * angle.std(axis=0) * rng.normal(size=angle.shape)
+    for factor in (0.77, 1.02, 1.3, 1.5):
+        assert better_period(time, angle, factor * period) == pytest.approx(period, rel=2e-3)
+    for factor in (1.0, 1.001, 2.0):
+        assert better_period(time, angle, factor * period) is None
+
+
+@pytest.mark.parametrize("motion", [filtered_noise, random_walk, random_steps, chirp, dying_swing])
+def test_a_motion_without_a_period_has_no_better_one_than_that_of_its_map(motion):
+    for seed in range(10):
+        rng = np.random.default_rng(seed)
+        time = np.arange(0.0, rng.uniform(10.0, 100.0), 0.01)
+        angle = motion(rng, time)[:, np.newaxis]
+        assert better_period(time, angle, 0.3 * time[-1]) is None, seed
+
+
 def repeated(rng):
     time = np.arange(0.0, 40.0, 0.005)
     angle = multisine(rng, time, 8.0, 1)[:, 0]
@@ -156,3 +178,6 @@ def test_an_import_without_a_period_in_its_map_reports_that_the_motion_repeats(i
     printed = imported(path, map_text=text).printed
     assert "the motion repeats every 8 s, but the map has no period_s" in printed
     assert "the motion repeats" not in imported(path, map_text=text + "period_s = 8.0").printed
+    printed = imported(path, map_text=text + "period_s = 10.4").printed
+    assert "the motion to train repeats every 8 s, but not after the 10.4 s" in printed
+    assert "set period_s = 8" in printed

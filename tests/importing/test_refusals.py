@@ -579,6 +579,24 @@ def test_a_joint_that_never_moves_is_reported(imported, pendulum, write_csv):
     assert "out of the map" not in outcome.printed  # without it nothing is left
 
 
+SECOND = """
+[[joint]]
+name = "knee"
+angle = { column = "knee", unit = "rad" }
+torque = { column = "tau", unit = "N·m" }
+
+"""
+
+
+def test_a_joint_that_rests_in_one_log_may_move_in_others(imported, pendulum, write_csv):
+    text = MAP.replace("[[recording]]", SECOND + "[[recording]]")
+    outcome = imported(
+        write_csv(pendulum.columns() | {"knee": np.full(2000, 0.3), "tau": pendulum.torque}),
+        map_text=text,
+    )
+    assert "if it rests in all runs, or else validate on a run in which it moves" in outcome.printed
+
+
 def test_a_sliding_joints_voltage_asks_for_its_own_gain_and_not_for_a_screw_alone():
     with pytest.raises(
         ValueError, match=r"^needs lead_m, or gain_n_v in place of gain_nm_v; add it"

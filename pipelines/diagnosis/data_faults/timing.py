@@ -41,7 +41,7 @@ def timing_faults(motion: Motion) -> Iterator[Fault]:
     # The difference of two independent deviations has twice their variance.
     jitter = float(np.std(steps)) / np.sqrt(2.0)
     if jitter > JITTER:
-        yield _irregular(motion, on_grid, jitter)
+        yield from _irregular(motion, on_grid, jitter)
     yield from _rate(motion, on_grid)
 
 
@@ -139,17 +139,20 @@ def _counter(motion: Motion) -> Iterator[Fault]:
             )
 
 
-def _irregular(motion: Motion, on_grid: NDArray, jitter: float) -> Fault:
-    """Report uneven steps.
+def _irregular(motion: Motion, on_grid: NDArray, jitter: float) -> Iterator[Fault]:
+    """Report uneven steps, unless the angles show that the samples were taken at their stamps.
 
-    Samples that were taken unevenly are valid where the stamps are right. Where only the stamps
-    are wrong, even ones mend the run.
+    These are no fault: angles are filtered, and errors averaged, over time and not over samples.
+    Where only the stamps are wrong, even ones mend the run.
     """
     explained, wrong = "take time from the device's clock, not from the host's", True
     if motion.measured_angle is not None:
-        explained, wrong = _judged(motion, motion.measured_angle, on_grid)
+        judged = _judged(motion, motion.measured_angle, on_grid)
+        if judged is None:
+            return
+        explained, wrong = judged
     even = motion.time - (on_grid - on_grid[0]) / motion.sample_rate_hz
-    return Fault(
+    yield Fault(
         FaultKind.CLOCK,
         motion.file,
         "time_s",
@@ -160,8 +163,8 @@ def _irregular(motion: Motion, on_grid: NDArray, jitter: float) -> Fault:
     )
 
 
-def _judged(motion: Motion, angle: NDArray, on_grid: NDArray) -> tuple[str, bool]:
-    """Return the meaning of uneven stamps, and whether they are wrong.
+def _judged(motion: Motion, angle: NDArray, on_grid: NDArray) -> tuple[str, bool] | None:
+    """Return the meaning of uneven stamps, and whether they are wrong; None where they are right.
 
     The roughness of the angles (n, J) is compared with that due to stamps off their grid, (n,).
     Third differences hold noise of angles and of stamps, and no smooth motion.
@@ -177,7 +180,7 @@ def _judged(motion: Motion, angle: NDArray, on_grid: NDArray) -> tuple[str, bool
     followed = float(np.sum(rough * stray)) / scale
     error = float(np.sqrt(len(sums)) * np.std(sums)) / scale
     if followed - SURE * error > HALF:
-        return "the angles follow the stamps: the stamps are right, and nothing is lost", False
+        return None
     if followed + SURE * error >= HALF:
         words = (
             "the angles are too coarse to show whether the stamps are right, so no sample is left"

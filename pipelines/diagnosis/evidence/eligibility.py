@@ -36,7 +36,8 @@ def refuse_unfit(motions: Sequence[Motion]) -> None:
         _refuse_one_angle_twice(motion)
     _refuse_twins(motions)
     for purpose, run in sorted({(m.purpose, m.run) for m in motions}):
-        _refuse_standstill([m for m in motions if (m.purpose, m.run) == (purpose, run)])
+        of_kind = [m for m in motions if (m.purpose, m.run) == (purpose, run)]
+        _refuse_standstill(of_kind, motions)
 
 
 def _refuse_monsters(motion: Motion) -> None:
@@ -92,10 +93,11 @@ def _refuse_twins(motions: Sequence[Motion]) -> None:
             )
 
 
-def _refuse_standstill(motions: Sequence[Motion]) -> None:
+def _refuse_standstill(motions: Sequence[Motion], session: Sequence[Motion]) -> None:
     """Raise InputError where the joints of one kind and purpose move too little.
 
-    Each joint must move for long enough, and all of them at once.
+    Each joint must move for long enough, and all of them at once. The whole session shows whether
+    one that rests here moves in other runs.
     """
     files = ", ".join(m.file for m in motions)
     together = f"in the {motions[0].run} runs to {motions[0].purpose} together"
@@ -107,10 +109,10 @@ def _refuse_standstill(motions: Sequence[Motion]) -> None:
     least = machine.lasting(least_s)
     for j, joint in enumerate(machine.joints):
         # First: a constant angle is the reason why a joint seems not to move.
-        _refuse_dead_angle(motions, j)
+        _refuse_dead_angle(motions, j, session)
         lasts = _seconds(motions, [m[:, j] for m in moving])
         if lasts < least:
-            simpler = _simpler(motions[0]) if lasts == 0.0 else ""
+            simpler = _simpler(motions, j, session) if lasts == 0.0 else ""
             raise InputError(
                 f"{files}: {the(joint.name)} moves for {_rounded_down(lasts):.1f} s (faster than"
                 f" {reversal_speeds(machine)[j]:.2g} {joint.unit('velocity')} and away from"
@@ -146,7 +148,7 @@ def _refuse_dead_torque(motions: Sequence[Motion], joint: int) -> None:
         raise silent_torque(motions, here, float(values[0]) + 0.0)
 
 
-def _refuse_dead_angle(motions: Sequence[Motion], joint: int) -> None:
+def _refuse_dead_angle(motions: Sequence[Motion], joint: int, session: Sequence[Motion]) -> None:
     """Raise InputError for a constant angle; after the filter it only seems to move."""
     measured = [m.measured_angle[m.valid, joint] for m in motions if m.measured_angle is not None]
     values = np.concatenate(measured) if measured else np.zeros(0)
@@ -156,14 +158,27 @@ def _refuse_dead_angle(motions: Sequence[Motion], joint: int) -> None:
             f"{', '.join(m.file for m in motions)}: the angle of {the(here.name)} is"
             f" {values[0]:.4g} {here.unit('angle')} in every row, expected a joint that moves;"
             f" check its encoder, and which channel {settings_of(motions[0])} reads"
-            f"{_simpler(motions[0])}"
+            f"{_simpler(motions, joint, session)}"
         )
 
 
-def _simpler(motion: Motion) -> str:
-    """Return the way out for a blocked joint of several: the others are a simpler machine."""
-    several = len(motion.joints) > 1
-    return f", or leave it out of {settings_of(motion)} if it rests" if several else ""
+def _simpler(motions: Sequence[Motion], joint: int, session: Sequence[Motion]) -> str:
+    """Return the way out for a blocked joint of several.
+
+    If it moves in no run of the session, the others are a simpler machine.
+    """
+    if len(motions[0].joints) < 2:
+        return ""
+    others = (m for m in session if not any(m is one for one in motions))
+    moves_in = next((m.file for m in others if _moves(m, joint)), None)
+    if moves_in is None:
+        return f", or leave it out of {settings_of(motions[0])} if it rests"
+    purpose = "train" if motions[0].purpose == "train" else "validate"
+    return f", or {purpose} on a run in which it moves, as in {moves_in}"
+
+
+def _moves(motion: Motion, joint: int) -> bool:
+    return bool((away_from_reversals(motion)[:, joint] & motion.valid).any())
 
 
 def _seconds(motions: Sequence[Motion], marked: Sequence[NDArray]) -> float:

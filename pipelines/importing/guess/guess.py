@@ -18,6 +18,12 @@ from pipelines.importing.guess.joints import (
     order_is_known,
 )
 from pipelines.importing.guess.names import Meaning, meaning
+from pipelines.importing.guess.own_clocks import (
+    OwnClock,
+    clocks_by_rows,
+    own_clocks,
+    with_slowest,
+)
 from pipelines.importing.guess.parts import Join, opened, runs_to_join
 from pipelines.importing.guess.proposal import Proposal
 from pipelines.importing.guess.time import (
@@ -61,9 +67,16 @@ def propose(paths: Sequence[Path]) -> Proposal:
             raise InputError(_no_clock(names, columns))
     for path in paths[1:]:
         _check_columns(path, source, join)
-    own_clocks = _clocks_by_rows(time, columns) | dict(source.clocks)
-    clocks = _onto_one_clock(own_clocks, time.column, columns)
-    clocks |= _into_blank_rows(names, time.column, columns)
+    by_rows = clocks_by_rows(time, columns) | dict(source.clocks)
+    time, clock_names = with_slowest(time, by_rows, names, columns, typed)
+    of_clocks = own_clocks(clock_names.values(), time, names, columns, typed)
+    clocks = _onto_one_clock(
+        {name: of_clocks[one] for name, one in clock_names.items() if one in of_clocks},
+        time,
+        columns,
+    )
+    own = dict(clocks)
+    clocks |= _into_blank_rows(names, time, columns)
     columns[time.column] = time.stamps(*(columns[name] for name in time.columns))
     # Within one run, because integrals and fits across a restart of the clock mean nothing.
     run = max(runs_of(columns[time.column], time.count_s), key=len)
@@ -98,16 +111,14 @@ def propose(paths: Sequence[Path]) -> Proposal:
     alone = len(joints) == 1
     for number, joint in enumerate(joints):
         used |= set(write_joint(proposal, number, joint, of_run, run.time_s, alone, clocks, limits))
-    used |= {clocks[name] for name in used if name in clocks}
+    used |= {clocks[name].column for name in used if name in clocks}
     if resting:
         rests = f"{', '.join(resting)} rest while others move, and are left out"
         proposal.doubt("joint", f"{rests}; with them, name their columns too")
     if not time.unit_sure and any("velocity" in joint.columns for joint in joints):
         proposal.doubt("joint.velocity.unit", "follows from the unit of time, which is unsure")
     _write_geometry(proposal, joints)
-    _write_recordings(
-        proposal, paths, [_period(path, join, time, joints, own_clocks) for path in paths]
-    )
+    _write_recordings(proposal, paths, [_period(path, join, time, joints, own) for path in paths])
     _write_unused(proposal, [name for name in source.names if name not in used], columns)
     return proposal
 
@@ -154,19 +165,22 @@ def _clock_first(names: Sequence[Meaning], source: Source) -> list[Meaning]:
     return [m for m in names if m.column == clock_name]
 
 
-def _into_blank_rows(names: Sequence[Meaning], column: str, columns: Columns) -> dict[str, str]:
+def _into_blank_rows(
+    names: Sequence[Meaning], time: TimeGuess, columns: Columns
+) -> dict[str, OwnClock]:
     """Interpolate columns that are blank in the rows of the torque; return their clock."""
     drive = next((m for m in names if m.quantity in TURNING), None)
     if drive is None or columns[drive.column].dtype.kind != "f":
         return {}
-    stamps, rows = columns[column].astype(float), np.isfinite(columns[drive.column])
-    blank: dict[str, str] = {}
+    stamps, rows = columns[time.column].astype(float), np.isfinite(columns[drive.column])
+    of_log = OwnClock(time.column, time.unit, time.scale)
+    blank: dict[str, OwnClock] = {}
     for name in (m.column for m in names if m.quantity in ("velocity", *MOTION)):
         values = columns[name]
         known = np.isfinite(values) if values.dtype.kind == "f" else np.array([])
         if known.shape == rows.shape and known.any() and np.mean(known[rows]) < 0.5:
             inside = np.interp(stamps, stamps[known], values[known], left=np.nan, right=np.nan)
-            columns[name], blank[name] = inside, column
+            columns[name], blank[name] = inside, of_log
     return blank
 
 
@@ -174,46 +188,33 @@ def _without_blanks(values: NDArray) -> NDArray:
     return values[np.isfinite(values)] if values.dtype.kind == "f" else values
 
 
-def _clocks_by_rows(time: TimeGuess, columns: Columns) -> dict[str, str]:
-    """Return the rival clock of each column that has its values in just the rows of its stamps.
-
-    A rival with stamps in all rows of the main clock and no others is not distinguished by rows.
-    """
-
-    def rows_of(name: str) -> NDArray:
-        values = columns[name]
-        return np.isfinite(values) if values.dtype.kind == "f" else np.ones(len(values), bool)
-
-    clocks: dict[str, str] = {}
-    for rival in time.rivals:
-        rows = rows_of(rival)
-        if np.array_equal(rows, rows_of(time.column)):
-            continue
-        clocks |= {
-            name: rival
-            for name in columns
-            if name not in (rival, time.column) and np.array_equal(rows_of(name), rows)
-        }
-    return clocks
-
-
-def _onto_one_clock(clocks: Mapping[str, str], column: str, columns: Columns) -> dict[str, str]:
+def _onto_one_clock(
+    clocks: Mapping[str, OwnClock], time: TimeGuess, columns: Columns
+) -> dict[str, OwnClock]:
     """Interpolate columns with a clock of their own, and return that clock by column."""
-    own: dict[str, str] = {}
-    if columns[column].dtype.kind not in "iuf":
+    own: dict[str, OwnClock] = {}
+    if columns[time.column].dtype.kind not in "iuf":
         return own
-    stamps = columns[column].astype(float)
-    for name, clock_name in clocks.items():
+    logged = (columns[name] for name in time.columns)
+    # Uniform times of rows have no origin in common with another clock.
+    stamps = columns[time.column] if time.rate_hz else time.stamps(*logged)
+    for name, of_channel in clocks.items():
         if name not in columns:
             continue
-        at, values = columns[clock_name], columns[name]
+        at, values = columns[of_channel.column], columns[name]
         numeric = {at.dtype.kind, values.dtype.kind} <= set("biuf")
-        if clock_name == column or not numeric or same_stamps(at, columns[column]):
+        if not numeric or len(at) != len(values) or same_stamps(at, columns[time.column]):
             continue
         known = np.isfinite(at) & np.isfinite(values)
         if known.any() and np.all(np.diff(at[known]) > 0):
-            inside = np.interp(stamps, at[known], values[known], left=np.nan, right=np.nan)
-            columns[name], own[name] = inside, clock_name
+            inside = np.interp(
+                stamps.astype(float),
+                of_channel.at(at[known], time),
+                values[known],
+                left=np.nan,
+                right=np.nan,
+            )
+            columns[name], own[name] = inside, of_channel
     return own
 
 
@@ -305,7 +306,7 @@ def _period(
     join: Join | None,
     time: TimeGuess,
     joints: Sequence[JointColumns],
-    clocks: Mapping[str, str],
+    clocks: Mapping[str, OwnClock],
 ) -> float | None:
     """Return the period of the motion in a file, s; of its set-points where these were logged."""
     names = {
@@ -313,9 +314,14 @@ def _period(
     }
     with about(path):
         source = opened(path, join)
-        own = [clocks[name] for name in names if name in clocks]
-        columns = source.load([*time.columns, *names, *own])
-    _onto_one_clock(clocks, time.column, columns)
+        own = {name: clocks[name] for name in names if name in clocks}
+        columns = source.load([*time.columns, *names, *(one.column for one in own.values())])
+    for one in own.values():
+        dates = _dates(columns[one.column])
+        columns[one.column] = _numeric(columns[one.column]) if dates is None else dates
+    if time.unit == "iso8601":
+        columns[time.column] = whole_nanoseconds(columns[time.column])
+    _onto_one_clock(own, time, columns)
     motion = {name: _numeric(columns[name]) for name in names}
     logged = (columns[name] for name in time.columns)
     as_numbers = whole_nanoseconds if time.unit == "iso8601" else _numeric

@@ -12,6 +12,7 @@ from pipelines.importing.guess.continuity import crosses_zero, is_continuous
 from pipelines.importing.guess.counting import Counting, countings
 from pipelines.importing.guess.joints import JointColumns
 from pipelines.importing.guess.motion import FROM_NAME, TURNS, Units, guess_units
+from pipelines.importing.guess.own_clocks import OwnClock
 from pipelines.importing.guess.proposal import Proposal
 from pipelines.importing.guess.torque import TorqueFit, fit_torque
 from pipelines.importing.quantities.numbers import are_whole
@@ -28,7 +29,7 @@ def write_joint(
     columns: Columns,
     time_s: NDArray,
     alone: bool,
-    clocks: Mapping[str, str],
+    clocks: Mapping[str, OwnClock],
     limits: Mapping[str, list[float]],
 ) -> list[str]:
     """Write a joint's tables into a map.
@@ -47,7 +48,7 @@ def write_joint(
         Times, s.
     alone : bool
         Whether it is the only joint. Motions of other joints would disturb a fit of its torque.
-    clocks : mapping of str to str
+    clocks : mapping of str to OwnClock
         Clocks of columns that have one of their own.
     limits : mapping of str to list of float
         Lowest and highest reading of columns with a value for missing ones.
@@ -108,7 +109,7 @@ class _JointWriter:
     logged: Mapping[str, NDArray]
     units: Units
     kind: Kind
-    clocks: Mapping[str, str]
+    clocks: Mapping[str, OwnClock]
     limits: Mapping[str, list[float]]
 
     def __post_init__(self) -> None:
@@ -202,8 +203,7 @@ class _JointWriter:
             self.proposal.table(f"[joint.{quantity}]", f"{self.where}.{quantity}")
             why = self.joint.why.get(quantity, "")
             self.proposal.key("column", meaning.column, why, quantity not in self.joint.doubtful)
-            if meaning.column in self.clocks:
-                self.proposal.key("time", self.clocks[meaning.column], "a clock of its own")
+            self._write_clock(meaning.column)
             dimensions = (dimension_at(self.kind, quantity), "counts")
             if meaning.unit is not None and UNITS[meaning.unit].dimension in dimensions:
                 unit = meaning.unit
@@ -247,11 +247,23 @@ class _JointWriter:
         self.proposal.key(
             "column", column, reason, not remark and quantity not in self.joint.doubtful
         )
-        if column in self.clocks:
-            self.proposal.key("time", self.clocks[column], "sampled by a clock of its own")
+        self._write_clock(column)
         if limits is not None:
             why = "outside lies one value, far from all others, as for missing readings"
             self.proposal.key("range", limits, why, sure=False)
+
+    def _write_clock(self, column: str) -> None:
+        if column not in self.clocks:
+            return
+        clock = self.clocks[column]
+        self.proposal.key("time", clock.column, "sampled by a clock of its own")
+        if not clock.as_log:
+            self.proposal.key("time_unit", clock.unit)
+            if clock.scale != 1.0:
+                self.proposal.key("time_scale", clock.scale)
+        if clock.offset_s:
+            why = "if both clocks began together: no stamp of one is a stamp of the other"
+            self.proposal.key("time_offset_s", clock.offset_s, why, sure=False)
 
     def _write_counting(self, quantity: str) -> None:
         counter = self.counters[quantity]

@@ -6,7 +6,8 @@ from pathlib import Path
 
 from pipelines.errors import about
 from pipelines.importing.guess.joints import TURNING
-from pipelines.importing.guess.names import meaning
+from pipelines.importing.guess.names import Meaning, meaning
+from pipelines.importing.guess.own_clocks import EQUALLY_FAST
 from pipelines.importing.sources.joined import firsts, open_run
 from pipelines.importing.sources.open import open_source
 from pipelines.importing.sources.source import Source
@@ -18,14 +19,15 @@ class Join:
     """Files of one run."""
 
     patterns: tuple[str, ...]
-    clock: str
+    clocks: tuple[str, ...]
+    """Column of the clock of each file."""
 
 
 def opened(path: Path, join: Join | None) -> Source:
     """Return the log in a file, or in the files of a run."""
     if join is None:
         return open_source(path, SourceSettings())
-    return open_run(path, SourceSettings(join=join.patterns), join.clock)
+    return open_run(path, SourceSettings(join=join.patterns), join.clocks[0], join.clocks)
 
 
 def runs_to_join(paths: Sequence[Path]) -> tuple[list[Path], Join | None]:
@@ -38,23 +40,42 @@ def runs_to_join(paths: Sequence[Path]) -> tuple[list[Path], Join | None]:
         with about(path):
             kinds.setdefault(open_source(path, SourceSettings()).names, []).append(path)
     meanings = [[meaning(name) for name in names] for names in kinds]
-    common = set.intersection(*(set(names) for names in kinds)) if kinds else set()
-    clocks = [m for m in meanings[0] if m.column in common] if meanings else []
+    clocks = _clocks(meanings)
     patterns = _patterns(list(kinds.values()))
-    if len(kinds) < 2 or patterns is None or [m.quantity for m in clocks] != ["time"]:
+    if len(kinds) < 2 or patterns is None or clocks is None:
         return list(paths), None
-    clock = clocks[0].column
-    rows = [_rows(files[0], clock) for files in kinds.values()]
+    rows = [_rows(files[0], name) for files, name in zip(kinds.values(), clocks, strict=True)]
     drives = [any(m.quantity in TURNING for m in names) for names in meanings]
-    # Ratio of their rows up to which two clocks count as equally fast.
-    equally_fast = 1.05
     # The slowest clock first: straight lines are accurate between samples closer than the rows. Of
     # equally fast ones the torque's, as angles are smoother.
     order = sorted(
-        range(len(kinds)), key=lambda k: (rows[k] > equally_fast * min(rows), not drives[k])
+        range(len(kinds)), key=lambda k: (rows[k] > EQUALLY_FAST * min(rows), not drives[k])
     )
-    join = Join(tuple(patterns[k] for k in order), clock)
+    join = Join(tuple(patterns[k] for k in order), tuple(clocks[k] for k in order))
     return firsts(paths, join.patterns), join
+
+
+def _clocks(kinds: Sequence[Sequence[Meaning]]) -> list[str] | None:
+    """Return the clock of each kind of files; None where they are no parts of a run.
+
+    Nothing but the clock is in several files. Where the clocks have different names, no file has
+    both angle and torque, as such a file is a log of its own.
+    """
+    names = [{m.column for m in kind} for kind in kinds]
+    common = set.intersection(*names) if names else set()
+    if common:
+        shared = [m for m in kinds[0] if m.column in common]
+        one = [m.quantity for m in shared] == ["time"]
+        return [shared[0].column] * len(kinds) if one else None
+    clocks = [[m.column for m in kind if m.quantity == "time"] for kind in kinds]
+    complete = any(
+        {"angle"} <= quantities and quantities & set(TURNING)
+        for quantities in ({m.quantity for m in kind} for kind in kinds)
+    )
+    if complete or any(len(own) != 1 for own in clocks):
+        return None
+    columns = [m.column for kind in kinds for m in kind if m.quantity != "time"]
+    return [own[0] for own in clocks] if len(set(columns)) == len(columns) else None
 
 
 def _rows(path: Path, clock: str) -> int:

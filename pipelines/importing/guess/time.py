@@ -18,6 +18,8 @@ from pipelines.settings.units import UNITS
 
 ADVANCES = 0.9
 """Least share of the steps of a clock that go forward."""
+DAY_S = 86_400.0
+"""A day, s."""
 LONG = ("min", "h", "d")
 """Units that a clock with decimals may have, though few do."""
 USUAL = 2.0
@@ -48,6 +50,8 @@ class TimeGuess:
     plus_unit: str = "ns"
     rivals: tuple[str, ...] = ()
     """Other clocks of the log, with other times."""
+    is_slowest: bool = False
+    """Whether it is the slowest of several clocks, and each other channel has its own."""
 
     @property
     def columns(self) -> list[str]:
@@ -77,7 +81,7 @@ class TimeGuess:
             In the clock's unit.
         """
         if plus is not None:
-            return _together(values, plus, self.plus_unit)
+            return _together(values, plus, self.plus_unit, self.unit)
         if self.rate_hz is None:
             return values
         return np.arange(len(values)) / (self.rate_hz * self.count_s)
@@ -102,7 +106,7 @@ def guess_time(
     TimeGuess or None
         None where no column is a clock.
     """
-    of_two = _of_two_columns(columns)
+    of_two = _of_two_columns(columns, typed)
     if of_two is not None:
         return of_two
     advancing = [m for m in meanings if _advances(columns[m.column], m.quantity == "time")]
@@ -127,16 +131,24 @@ def guess_time(
     return None
 
 
-def _of_two_columns(columns: Mapping[str, NDArray]) -> TimeGuess | None:
-    """Return the clock of a log that has whole seconds and their fractions in two columns."""
+def _of_two_columns(columns: Mapping[str, NDArray], typed: Mapping[str, str]) -> TimeGuess | None:
+    """Return the clock of a log that has whole seconds and their fractions in two columns.
+
+    The seconds are a number, or a time of day, as in the columns Time and Millitm of FactoryTalk.
+    """
     whole = {
         name: values
         for name, values in columns.items()
         if values.dtype.kind in "iu" and len(values) > 9
     }
     for seconds, values in whole.items():
-        steps = np.diff(values.astype(float))
+        unit = "iso8601" if typed.get(seconds) == "iso8601" else "s"
+        steps = np.diff(_whole_seconds(values, unit).astype(float))
+        # A time of day goes on after midnight.
+        steps = np.where(steps == 1.0 - DAY_S, 1.0, steps) if unit == "iso8601" else steps
         if not (steps.any() and np.isin(steps, (0.0, 1.0)).all() and np.mean(steps) < 0.5):
+            continue
+        if np.any(np.diff(values)[steps == 0.0]):  # it has fractions of its own
             continue
         for name, fractions in whole.items():
             full = next(
@@ -144,12 +156,19 @@ def _of_two_columns(columns: Mapping[str, NDArray]) -> TimeGuess | None:
             )
             # The fractions start over where a second is full, and nowhere else.
             if full and np.array_equal(np.diff(fractions.astype(float)) < 0.0, steps > 0.0):
-                step = clock.period(_together(values, fractions, full).astype(float))
+                stamps = _together(values, fractions, full, unit)
+                step = clock.period(stamps.astype(float))
                 why = f"seconds, with fractions in {name}: {_rate_hz(step, full):.4g} Hz"
                 return TimeGuess(
-                    seconds, "s", why, True, True, None, False, plus=name, plus_unit=full
+                    seconds, unit, why, True, True, None, False, plus=name, plus_unit=full
                 )
     return None
+
+
+def _whole_seconds(values: NDArray, unit: str) -> NDArray:
+    """Return seconds (n,) as integers, of dates in nanoseconds too."""
+    whole = values.astype(np.int64)
+    return whole // round(1.0 / UNITS[unit].factor) if unit == "iso8601" else whole
 
 
 def _fills(fractions: NDArray, unit: str) -> bool:
@@ -158,9 +177,10 @@ def _fills(fractions: NDArray, unit: str) -> bool:
     return bool(len(fractions)) and 0 <= fractions.min() and 0.5 * full < fractions.max() < full
 
 
-def _together(seconds: NDArray, fractions: NDArray, unit: str) -> NDArray:
+def _together(seconds: NDArray, fractions: NDArray, unit: str, of_seconds: str) -> NDArray:
     """Return the stamps of seconds (n,) and their fractions, in the unit of these."""
-    return seconds.astype(np.int64) * round(1.0 / UNITS[unit].factor) + fractions.astype(np.int64)
+    whole = _whole_seconds(seconds, of_seconds)
+    return whole * round(1.0 / UNITS[unit].factor) + fractions.astype(np.int64)
 
 
 def _rivals(
@@ -375,7 +395,12 @@ def write_time(proposal: Proposal, guess: TimeGuess, held: Sequence[str]) -> Non
         why += ", but starts over"
     if not guess.sure:
         why += ", as no other does"
-    if guess.rivals:
+    if guess.is_slowest:
+        why += ", the slowest clock of an angle or torque"
+        if guess.rivals:
+            others = " and ".join(guess.rivals)
+            why += f"; set time_offset_s at the channels of {others} if they did not begin together"
+    elif guess.rivals:
         why += f", and so does {' and '.join(guess.rivals)}: name it as `time` of its channels"
         why += ", with time_offset_s if they did not begin together, and let the slowest be [time]"
     proposal.key("column", guess.column, why, guess.sure and not guess.rivals)

@@ -30,6 +30,19 @@ OTHERS = (
     *("W", "kW", "Hz", "kHz", "J", "bar", "Pa", "kg", "Ohm"),
 )
 """Units of quantities that no map has."""
+FOREIGN = {
+    **dict.fromkeys(("gon", "mgon", "arcmin", "arcsec", "ft"), "angle"),
+    **dict.fromkeys(("gon/s", "deg/min", "°/min", "rad/min", "rev/h"), "velocity"),
+    **dict.fromkeys(("m/min", "mm/min", "in/min", "ft/s", "km/h", "mph"), "velocity"),
+    **dict.fromkeys(
+        ("kgf·m", "kgf*m", "kgf.m", "kgfm", "kpm", "kp·m", "dyn·cm", "gf·cm"), "torque"
+    ),
+    **dict.fromkeys(("oz-in", "ozf-in", "oz·in", "ozf·in", "ozin", "dNm", "daNm"), "torque"),
+    **dict.fromkeys(("gf", "daN", "ozf", "dyn"), "force"),
+    **dict.fromkeys(("µA", "μA", "uA", "kA"), "current"),
+    **dict.fromkeys(("µV", "μV", "uV", "kV"), "voltage"),
+}
+"""Units in brackets that no map has, and the quantity that is measured in them."""
 BRACKETS = re.compile(r"[\[({<]([^\])}>]*)[\])}>]")
 FACTOR = re.compile(r"(?<![^\W_])[x×*/] ?10+(?![\d.])|(?<!\d)10 ?\^ ?-?\d+|\d*\.\d+(?= ?[^\W\d_])")
 """A factor next to a unit outside of brackets: ``x10``, ``/100``, ``10^-3``, ``0.1 Nm``."""
@@ -50,6 +63,8 @@ class UnitInName:
     @property
     def quantity(self) -> str:
         """Quantity that is measured in it; empty where unknown."""
+        if self.unread in FOREIGN:
+            return FOREIGN[self.unread]
         return QUANTITIES.get(UNITS[self.unit].dimension, "") if self.unit else ""
 
 
@@ -69,6 +84,8 @@ def _with_factor(name: str) -> UnitInName | None:
     for bracket in BRACKETS.finditer(name):
         text = bracket[1].strip()
         known = text in OTHERS or _written(text)
+        if text in FOREIGN:
+            return UnitInName(_without(name, bracket), None, decides=True, unread=text)
         has_factor = re.search(r"\d", text) and (_WORD.search(text) or "%" in text)
         is_product = re.search(r"[^\W\d_]\s*[*·/^]\s*\w", text)
         if not known and (has_factor or is_product):

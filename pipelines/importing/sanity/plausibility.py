@@ -90,7 +90,11 @@ def _still(
         if np.ptp(columns[name]) == 0.0:
             action = "it carries no information"
             if quantity == "angle" and not is_only_joint:
-                action += "; leave a joint at rest out of the map"
+                # Another log, or another import, may have runs in which it moves.
+                action += (
+                    "; leave the joint out of the map if it rests in all runs, or else validate on"
+                    " a run in which it moves"
+                )
             if quantity == "torque" and not columns[name].any():
                 action += '; set drive = "none" in place of the table if the joint has no drive'
             yield Finding(name, f"is {columns[name][0]:.6g} in every row", action)

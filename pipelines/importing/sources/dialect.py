@@ -22,6 +22,8 @@ FEWEST = 10
 COMMENTS = ("#", "%", "//")
 BYTE_ORDER_MARKS = {b"\xef\xbb\xbf": "utf-8-sig", b"\xff\xfe": "utf-16", b"\xfe\xff": "utf-16"}
 NOT_A_NUMBER = {"", "nan", "null", "none", "na", "n/a", "inf", "-inf", "-nan", "true", "false"}
+DATE = re.compile(r"\d{1,4}[-./]\d{1,2}[-./]\d{1,4}[T\s]+\d{1,2}:\d\d(:\d\d)?")
+"""Beginning of a date with its time of day."""
 
 
 @dataclass(frozen=True)
@@ -299,7 +301,11 @@ def _are_numbers(fields: list[str], decimal: str) -> bool:
     # Least share of numbers among the fields of a row of data; others are dates and states.
     enough = 0.5
     numbers = sum(_is_number(field, decimal) for field in fields)
-    return numbers >= 2 and numbers >= enough * sum(not _is_missing(field) for field in fields)
+    # A date and one number are the least row of a log that is one of several files of a run.
+    dated = numbers == 1 and any(DATE.match(field) for field in fields)
+    return (numbers >= 2 or dated) and numbers >= enough * sum(
+        not _is_missing(field) for field in fields
+    )
 
 
 def _is_missing(field: str) -> bool:

@@ -53,6 +53,24 @@ def leaves_of(content: Any, name: str = "") -> Leaves:
     return dict(_leaves(content, name))
 
 
+def places_of(content: Any, name: str = "") -> dict[str, str]:
+    """Return the names of signals by their places in a list of records, and by their own names.
+
+    ``Y.Data[0]`` is the Data of the first record in Y, whose column has the record's name.
+    """
+    places: dict[str, str] = {}
+    if isinstance(content, Mapping):
+        for key, value in content.items():
+            places |= places_of(value, f"{name}.{key}" if name else str(key))
+    elif is_list_of_records(content) and _are_signals(content):
+        labels = [_label(record) for record in content]
+        arrays = [[key for key, one in record.items() if _longest(one) > 1] for record in content]
+        if _are_names(labels) and all(len(keys) == 1 for keys in arrays):
+            for k, (label, (key,)) in enumerate(zip(labels, arrays, strict=True)):
+                places[f"{name}.{key}[{k}]"] = f"{name}.{label}"
+    return places
+
+
 def vector_lengths(shapes: Iterable[tuple[int, ...]]) -> frozenset[int]:
     """Return the lengths of vectors among arrays of these shapes."""
     return frozenset(max(shape) for shape in shapes if shape and _is_vector(shape))

@@ -1,7 +1,7 @@
 """One run in several files, joined by their clocks."""
 
 import re
-from collections.abc import Sequence
+from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 
 from pipelines.errors import InputError, about
@@ -9,8 +9,13 @@ from pipelines.importing.sources.open import open_source
 from pipelines.importing.sources.source import Columns, Source
 from pipelines.settings.import_map import SourceSettings
 
+TWIN = re.compile(r"#\d+$")
+"""Number of a file at a name that an earlier file has, too."""
 
-def open_run(path: Path, settings: SourceSettings, clock: str | None) -> Source:
+
+def open_run(
+    path: Path, settings: SourceSettings, clock: str | None, others: Collection[str] = ()
+) -> Source:
     """Return the log in a file, or in the files of a run.
 
     Parameters
@@ -20,20 +25,22 @@ def open_run(path: Path, settings: SourceSettings, clock: str | None) -> Source:
     settings : SourceSettings
         ``join`` names its files.
     clock : str or None
-        The column of the clock, which each file of several has.
+        The column of the clock.
+    others : collection of str
+        Columns of the clocks of files that have another one.
 
     Raises
     ------
     InputError
-        If a file cannot be read, or has no such clock.
+        If a file cannot be read, or has none of these clocks.
     """
     if settings.join is None:
         return open_source(path, settings)
     sources = []
     for part in parts_of(path, settings.join):
-        with about(part):
+        with about(part if part != path else None):
             sources.append(open_source(part, settings))
-    return joined(sources, str(clock))
+    return joined(sources, str(clock), others)
 
 
 def firsts(files: Sequence[Path], join: Sequence[str] | None) -> list[Path]:
@@ -74,7 +81,7 @@ def parts_of(file: Path, join: Sequence[str]) -> list[Path]:
     )
 
 
-def joined(sources: Sequence[Source], clock: str) -> Source:
+def joined(sources: Sequence[Source], clock: str, others: Collection[str] = ()) -> Source:
     """Return the files of one run as one log.
 
     Columns of the other files keep their names, or get the number of the file if the name is taken:
@@ -85,24 +92,28 @@ def joined(sources: Sequence[Source], clock: str) -> Source:
     sources : sequence of Source
         The files of a run.
     clock : str
-        The column of the clock, which each file has.
+        The column of the clock, which a file has under this name if it has none of ``others``.
+    others : collection of str
+        Columns of other clocks, by their names in the joined log.
 
     Raises
     ------
     InputError
-        If a file has no such column.
+        If a file has none of these columns, or several of the others.
     """
     places: dict[str, tuple[Source, str]] = {}
     clocks: dict[str, str] = {}
     units: dict[str, str] = {}
+    of_files = []
     for number, source in enumerate(sources, 1):
-        if clock not in source.names:
-            with about(source.path):
-                raise InputError(f"has no column {clock!r}, the clock by which files are joined")
         called = {name: f"{name}#{number}" if name in places else name for name in source.names}
+        # The caller names the first file, which stands for the run.
+        with about(source.path if number > 1 else None):
+            of_file = _clock_of(called, clock, others)
+        of_files.append(of_file)
         places |= {called[name]: (source, name) for name in source.names}
         units |= {called[name]: unit for name, unit in source.units.items()}
-        clocks |= {called[name]: called[clock] for name in source.names if name != clock}
+        clocks |= {name: of_file for name in called.values() if name != of_file}
         clocks |= {called[name]: called[own] for name, own in source.clocks.items()}
 
     def load(names: Sequence[str]) -> Columns:
@@ -113,8 +124,10 @@ def joined(sources: Sequence[Source], clock: str) -> Source:
             columns |= {name: loaded[inner] for name, inner in own.items()}
         return columns
 
-    first, *others = sources
-    remark = f"joined with {', '.join(one.path.name for one in others)} by the clock {clock!r}"
+    first, *rest = sources
+    distinct = list(dict.fromkeys(places[name][1] for name in of_files))
+    by = f"the clock{'s' if len(distinct) > 1 else ''} {', '.join(map(repr, distinct))}"
+    remark = f"joined with {', '.join(one.path.name for one in rest)} by {by}"
     return Source(
         first.path,
         first.format,
@@ -124,4 +137,28 @@ def joined(sources: Sequence[Source], clock: str) -> Source:
         units=units,
         clocks=clocks,
         remarks=(*(remark for one in sources for remark in one.remarks), remark),
+    )
+
+
+def _clock_of(called: Mapping[str, str], clock: str, others: Collection[str]) -> str:
+    """Return the clock of a file, by its name in the joined log.
+
+    The file's columns are given by their own names, with those in the joined log.
+    """
+    if clock in called.values():
+        return clock
+    # The clock of the log may be that of a later file, which has it as t#2.
+    same = called.get(TWIN.sub("", clock))
+    if same is not None:
+        return same
+    own = [name for inner, name in called.items() if {inner, name} & set(others)]
+    if len(own) == 1:
+        return own[0]
+    if own:
+        raise InputError(
+            f"has the clocks {', '.join(own)} in the map, expected one in each file that is joined"
+        )
+    raise InputError(
+        f"has no column {clock!r}, the clock by which files are joined; if its clock has another"
+        " name, set that as time of its channels, and its time_unit"
     )

@@ -5,7 +5,7 @@ from pathlib import Path
 import scipy.io
 
 from pipelines.errors import InputError
-from pipelines.importing.sources.flatten import leaves_of, nested_source
+from pipelines.importing.sources.flatten import leaves_of, nested_source, places_of
 from pipelines.importing.sources.hdf5 import open_hdf5
 from pipelines.importing.sources.source import Source
 from pipelines.settings.import_map import SourceSettings
@@ -46,4 +46,5 @@ def open_matlab(path: Path, settings: SourceSettings) -> Source:
                 f"{suggestion(settings.table, list(variables))}"
             )
         variables = variables[settings.table]
-    return nested_source(path, "MATLAB", leaves_of(variables))
+    aliases = places_of(variables)
+    return nested_source(path, "MATLAB", leaves_of(variables), aliases=aliases)

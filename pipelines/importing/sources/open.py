@@ -8,6 +8,7 @@ from pipelines.errors import InputError
 from pipelines.importing.sources.excel import open_excel
 from pipelines.importing.sources.hdf5 import open_hdf5
 from pipelines.importing.sources.json_text import open_json
+from pipelines.importing.sources.lvm import MAGIC, open_lvm
 from pipelines.importing.sources.matlab import open_matlab
 from pipelines.importing.sources.mdf import open_mdf
 from pipelines.importing.sources.numpy_archive import open_numpy
@@ -30,6 +31,7 @@ BEGINNINGS: dict[bytes, Callable[[Path, SourceSettings], Source]] = {
     b"MDF     ": open_mdf,
     b"UnFinMF ": open_mdf,
     b"\x93NUMPY": open_numpy,
+    MAGIC: open_lvm,
 }
 """First bytes of a file, by format."""
 

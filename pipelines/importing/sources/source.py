@@ -29,6 +29,8 @@ class Source:
     """Clocks of columns, where the file says which was sampled by which."""
     remarks: tuple[str, ...] = ()
     """What was not as it should be, for the user."""
+    aliases: Mapping[str, str] = field(default_factory=dict)
+    """Other names that a map may use, and the columns that they mean."""
 
     @classmethod
     def in_memory(cls, path: Path, format: str, columns: Columns, **more: Any) -> "Source":
@@ -36,6 +38,10 @@ class Source:
         return cls(
             path, format, tuple(columns), lambda names: {n: columns[n] for n in names}, **more
         )
+
+    def column_named(self, name: str) -> str:
+        """Return the column that a map means by a name."""
+        return name if name in self.names else self.aliases.get(name, name)
 
     def __str__(self) -> str:
         return str(self.path)

@@ -63,7 +63,7 @@ def usual_units(step: float, units: Sequence[str] = ("s", "ms", "us", "ns")) -> 
     return [unit for unit, rate_hz in rates_hz.items() if SLOWEST_HZ <= rate_hz <= FASTEST_HZ]
 
 
-def _check_unit(raw: NDArray, column: str, unit: str) -> None:
+def _check_unit(raw: NDArray, column: str, unit: str, key: str) -> None:
     """Refuse dates with the unit of numbers, and numbers with the unit of dates."""
     content = _content(raw)
     fits = {
@@ -81,7 +81,7 @@ def _check_unit(raw: NDArray, column: str, unit: str) -> None:
         right = usual_units(period(numbers(known))) or ["s", "ms", "us", "ns"]
     raise SettingsError(
         f"{column!r} holds {content}, the first {str(known[0])[:LONGEST]!r}, but the map has"
-        f" time.unit = {unit!r}; set it to {' or '.join(right)}"
+        f" {key} = {unit!r}; set it to {' or '.join(right)}"
     )
 
 
@@ -98,7 +98,12 @@ def _content(raw: NDArray) -> str:
 
 
 def stamps(
-    raw: NDArray, column: str, settings: TimeSettings, note: Note, plus: NDArray | None = None
+    raw: NDArray,
+    column: str,
+    settings: TimeSettings,
+    note: Note,
+    plus: NDArray | None = None,
+    key: str = "time.unit",
 ) -> NDArray:
     """Return time stamps as numbers of counts (``TimeSettings.count_s``).
 
@@ -116,6 +121,8 @@ def stamps(
         Takes what is reported about the stamps.
     plus : (n,) array, optional
         The column that is added.
+    key : str
+        Key of the map with the unit, for messages.
 
     Returns
     -------
@@ -132,8 +139,8 @@ def stamps(
     if plus is not None and len(plus) != len(raw):
         raise InputError(f"time.plus has {len(plus)} rows, expected {len(raw)} as {column!r}")
     if settings.is_written:
-        return _written(raw, column, settings, note, plus)
-    _check_unit(raw, column, settings.unit)
+        return _written(raw, column, settings, note, plus, key)
+    _check_unit(raw, column, settings.unit, key)
     values = _counts(raw, note)
     if plus is None:
         return values
@@ -152,7 +159,7 @@ def _counts(raw: NDArray, note: Note) -> NDArray:
 
 
 def _written(
-    raw: NDArray, column: str, settings: TimeSettings, note: Note, plus: NDArray | None
+    raw: NDArray, column: str, settings: TimeSettings, note: Note, plus: NDArray | None, key: str
 ) -> NDArray:
     """Return dates and times of day as nanoseconds."""
     # A number without a unit, such as 120000, is a time of day written without colons.
@@ -162,7 +169,7 @@ def _written(
         days = raw.astype("datetime64[D]") if raw.dtype.kind == "M" else raw
         raw = np.array([f"{day} {time}" for day, time in zip(days, plus, strict=True)], object)
     if settings.format is None:
-        _check_unit(raw, column, settings.unit)
+        _check_unit(raw, column, settings.unit, key)
     values = whole_nanoseconds(raw, settings.format)
     if len(raw) and not np.isfinite(values).any():
         example = " such as 2026-01-31 12:00:00.125" if settings.format is None else ""
@@ -308,11 +315,7 @@ def runs(time_s: NDArray, raw: NDArray, count_s: float, note: Note = unnoted) ->
     rows = _without_outliers(rows, time_s, note)
     begins = _begins(time_s[rows])
     _check_fractions(raw[rows], begins[1:])
-    for k in begins[1:]:
-        back = time_s[rows[k - 1]] - time_s[rows[k]]
-        seen = f"clock starts over at row {rows[k]}, {back:.6g} s back"
-        step = period(time_s[rows]) / count_s
-        note(seen, _if_full(float(raw[rows[k - 1]]), float(raw[rows[k]]), step, count_s))
+    _note_restarts(rows, begins[1:], time_s, raw, count_s, note)
     parts = [_ordered(part, time_s) for part in np.split(rows, begins[1:])]
     return [run for run in parts if len(run) > 1]
 
@@ -453,11 +456,29 @@ def _in_counts(seconds: float, count_s: float) -> float:
     return float(f"{seconds / count_s:.12g}")
 
 
-def _if_full(before: float, after: float, step: float, count_s: float) -> str:
-    full = full_clock(before, after, step, count_s)
-    if full is None:
-        return "another run begins"
-    return f"after {before:.10g}: if it was full, set time.wraps_at = {full:.12g}"
+def _note_restarts(
+    rows: NDArray,
+    begins: Sequence[int],
+    time_s: NDArray,
+    raw: NDArray,
+    count_s: float,
+    note: Note,
+) -> None:
+    """Report where a clock starts over: of times with one remedy, how many and the first."""
+    step = period(time_s[rows]) / count_s
+    by_modulus: dict[float | None, list[int]] = {}
+    for k in begins:
+        full = full_clock(float(raw[rows[k - 1]]), float(raw[rows[k]]), step, count_s)
+        by_modulus.setdefault(full, []).append(k)
+    for full, places in by_modulus.items():
+        first = places[0]
+        back = time_s[rows[first - 1]] - time_s[rows[first]]
+        times = "" if len(places) == 1 else f" {len(places)} times, the first"
+        action = "another run begins" if len(places) == 1 else "each time another run begins"
+        if full is not None:
+            before = float(raw[rows[first - 1]])
+            action = f"after {before:.10g}: if it was full, set time.wraps_at = {full:.12g}"
+        note(f"clock starts over{times} at row {rows[first]}, {back:.6g} s back", action)
 
 
 def _ordered(rows: NDArray, time_s: NDArray) -> Run:

@@ -15,6 +15,12 @@ from pipelines.signals.sampling import whole_periods
 SIMILAR = 0.5
 """Half mean squared difference, in variances, below which a motion may repeat."""
 
+REPEATS = 5e-4
+"""Difference of the median pair of neighbouring periods of a periodic motion: 3 % in rms.
+
+Drives repeat their errors, too. A machine that swings freely does not repeat so well.
+"""
+
 
 def repeats_after(time_s: NDArray, motion: NDArray) -> float | None:
     """Return the period of a motion.
@@ -32,17 +38,58 @@ def repeats_after(time_s: NDArray, motion: NDArray) -> float | None:
         Period, s. None if the run is shorter than two periods, or its periods differ by more than a
         drive's errors.
     """
+    on_grid = _on_grid(time_s, motion)
+    found = None if on_grid is None else _best_period(*on_grid)
+    return None if found is None else found[0]
+
+
+def better_period(time_s: NDArray, motion: NDArray, period_s: float) -> float | None:
+    """Return the period of a motion that does not repeat after the one that is given.
+
+    Parameters
+    ----------
+    time_s : (n,) array
+        Times, s.
+    motion : (n, k) array
+        Angles or set-points of k joints, in any units, NaN where missing.
+    period_s : float
+        Period that is given, s; multiples of the shortest one are right, too.
+
+    Returns
+    -------
+    float or None
+        Period, s. None if the motion repeats after the given one, if it is shorter than two of
+        these, or if it has no period.
+    """
+    # Factor by which the given period must fit worse.
+    much_worse = 20.0
+    # Share of a period within which it is a multiple of another: a ramp at an end of a few periods
+    # makes their difference large, with the right one, too.
+    same = 5e-3
+    on_grid = _on_grid(time_s, motion)
+    if on_grid is None:
+        return None
+    step, columns = on_grid
+    if whole_periods(len(columns) - 1, 1.0, period_s / step) < 2:
+        return None
+    given = _median_difference(columns, period_s / step)
+    if given <= REPEATS:
+        return None
+    found = _best_period(step, columns)
+    if found is None or given < much_worse * found[1]:
+        return None
+    best_s = found[0]
+    is_multiple = abs(period_s - best_s * round(period_s / best_s)) <= same * period_s
+    return None if is_multiple else best_s
+
+
+def _on_grid(time_s: NDArray, motion: NDArray) -> tuple[float, NDArray] | None:
+    """Return a uniform step, s, and the joints that move at its instants, scaled to variance 1.
+
+    None where none moves, or rows are too few.
+    """
     # Greatest number of instants that are compared.
     points = 20_000
-    # Difference of the median pair of neighbouring periods of a periodic motion: 3 % in rms. Drives
-    # repeat their errors, too. A machine that swings freely does not repeat so well.
-    repeats = 5e-4
-    # Factor on the least difference up to which a shorter lag is preferred.
-    as_good = 3.0
-    # The same for a lag of fewer digits.
-    as_round = 1.1
-    # Difference due to a sensor's resolution and interpolation alone.
-    equal = 1e-8
     moving = [
         column
         for column in motion.T
@@ -57,8 +104,17 @@ def repeats_after(time_s: NDArray, motion: NDArray) -> float | None:
     step = max(float(np.median(np.diff(time_s))), (time_s[-1] - time_s[0]) / points)
     grid = np.arange(time_s[0], time_s[-1] + 0.5 * step, step)
     columns = np.column_stack([np.interp(grid, time_s, column) for column in moving])
-    columns = (columns - columns.mean(axis=0)) / np.maximum(columns.std(axis=0), 1e-300)
+    return step, (columns - columns.mean(axis=0)) / np.maximum(columns.std(axis=0), 1e-300)
 
+
+def _best_period(step: float, columns: NDArray) -> tuple[float, float] | None:
+    """Return the period of joints (n, k) on a grid of a step, s, and its periods' difference."""
+    # Factor on the least difference up to which a shorter lag is preferred.
+    as_good = 3.0
+    # The same for a lag of fewer digits.
+    as_round = 1.1
+    # Difference due to a sensor's resolution and interpolation alone.
+    equal = 1e-8
     difference_at = partial(_median_difference, columns)
     near = [
         _refined(difference_at, lag)
@@ -66,7 +122,7 @@ def repeats_after(time_s: NDArray, motion: NDArray) -> float | None:
         if difference_at(lag) < SIMILAR
     ]
     best = min((difference for _, difference in near), default=np.inf)
-    if best > repeats:
+    if best > REPEATS:
         return None
     # The shortest that is nearly as good, because every multiple of a period repeats, too.
     lag, least = min(
@@ -76,7 +132,7 @@ def repeats_after(time_s: NDArray, motion: NDArray) -> float | None:
     rounder = (float(f"{step * lag:.{digits}g}") for digits in range(1, 7))
     limit = max(as_round * least, equal)
     near_enough = (period_s for period_s in rounder if difference_at(period_s / step) < limit)
-    return next(near_enough, float(f"{step * lag:.6g}"))
+    return next(near_enough, float(f"{step * lag:.6g}")), least
 
 
 def _mean_differences(columns: NDArray) -> NDArray:
