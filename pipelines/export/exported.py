@@ -24,7 +24,7 @@ from pipelines.model import Model, Term, model_from_parameters
 
 
 @dataclass(frozen=True)
-class Exported:
+class ExportedModel:
     """A model to export, with all values."""
 
     model: Model
@@ -148,7 +148,7 @@ def values_in_words(term: Term) -> str:
 
 def exported(
     table: Table, run: str | None = None, default_geometry: Geometry | None = None
-) -> Exported:
+) -> ExportedModel:
     """Return the model of one kind of run from a ``parameters/1`` table.
 
     Parameters
@@ -189,7 +189,7 @@ def exported(
         rigid = [term for term in acting if term.effect.spring is None or term.effect.at_cuff]
         # Refuses models that no real machine has.
         make_plant(Model(tuple(rigid)), geometry, machine.joints, kind)
-    return Exported(acting, tuple(absent), run, geometry, machine, table)
+    return ExportedModel(acting, tuple(absent), run, geometry, machine, table)
 
 
 def _why_absent(term: Term, run: str, has_cuffs: bool) -> str:
