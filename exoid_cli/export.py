@@ -111,10 +111,10 @@ def _report(exported: "ExportedModel", chosen: "Format[ExportedModel]", files: l
         terms.append(about | {"parameters": values})
     written = [str(file) for file in files]
     result = {"to": chosen.name, "run": exported.run, "files": written}
-    console.emit(result | {"warnings": exported.driving(), "terms": terms})
+    console.emit(result | {"warnings": exported.friction_warnings(), "terms": terms})
     rows = [(term.effect.label, holding.degree, holding.how) for term, holding in holdings]
     console.table(("term", "in the file", "how"), rows)
-    for sentence in exported.driving():
+    for sentence in exported.friction_warnings():
         console.warn(sentence)
     for term, holding in holdings:
         if holding.degree is Degree.NOT:

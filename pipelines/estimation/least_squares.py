@@ -27,7 +27,7 @@ class WeightedLeastSquares(Estimator):
     name = "weighted_least_squares"
     short = "wls"
     title = "weighted least squares"
-    passes = 3
+    reweightings = 3
     """Number of times that the joints are weighted again."""
 
     def fit(self, problem: Problem) -> Fit:
@@ -69,7 +69,7 @@ class WeightedLeastSquares(Estimator):
     def _weights(self, rows: CompressedRows, names: list[str]) -> NDArray:
         # Feasible generalised least squares, which begins with equal weights.
         weights = np.ones(len(rows.count))
-        for _ in range(self.passes):
+        for _ in range(self.reweightings):
             normal, right = normal_equations(rows, weights)
             values = inverse(normal, names) @ right
             weights = 1.0 / np.maximum(residual_rms(rows, values), LEAST_NM) ** 2
@@ -82,7 +82,7 @@ class OrdinaryLeastSquares(WeightedLeastSquares):
     name = "ordinary_least_squares"
     short = "ols"
     title = "ordinary least squares"
-    passes = 0
+    reweightings = 0
 
 
 def _scores(

@@ -67,7 +67,7 @@ class ExportedModel:
         """Return each term of the file and how the format holds it."""
         return [(term, format.holding(term)) for term in self.terms] + list(self.absent)
 
-    def driving(self) -> list[str]:
+    def friction_warnings(self) -> list[str]:
         """Return a warning for each negative friction coefficient, which drives its joint."""
         return [
             f"{term.effect.label}: {p.name} = {value:.3g} {p.unit} is negative: it drives the"
@@ -99,7 +99,7 @@ class ExportedModel:
             )
         yield "SI units; angles as the encoders give them, torques as the drives deliver them"
         yield ""
-        yield from (f"WARNING: {sentence}" for sentence in self.driving())
+        yield from (f"WARNING: {sentence}" for sentence in self.friction_warnings())
         for term, holding in self.holdings(format):
             yield f"{term.effect.label}: {holding.degree} ({holding.how})"
             if holding.degree is not Degree.EXACT:
