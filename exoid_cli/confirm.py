@@ -64,7 +64,7 @@ def confirm(
 def ask_before(experiment: "Experiment", step: "Step", *, yes: bool) -> tuple[str, ...]:
     """Ask before a step that moves a real rig in a run that was not named on the command line.
 
-    Returns the arguments that its command needs besides.
+    Returns further arguments for its command.
     """
     from pipelines.settings.rig import load_rig
     from pipelines.settings.rig.recording_only import is_recording_only

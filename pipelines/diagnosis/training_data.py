@@ -59,7 +59,7 @@ def training_data(
     motions : sequence of Motion
         Runs of one machine, some to train and some to validate.
     known : sequence of str
-        Labels of effects that the machine is known to have besides rigid body and friction.
+        Labels of effects that the machine is known to have, without rigid body and friction.
     accept : sequence of FaultKind
         Kinds of faults of acquisition whose veto the user overrules.
 
