@@ -103,8 +103,8 @@ class OperatorPrompt:
     def __init__(self) -> None:
         if not sys.stdin.isatty():
             raise InputError(
-                "--by-hand: standard input is no terminal, so no person can be asked; run it in a"
-                " terminal"
+                "--by-hand: standard input is not a terminal, so no person can be asked; run it in"
+                " a terminal"
             )
 
     async def ready(self, prompt: str) -> None:

@@ -369,11 +369,11 @@ def parsed(path: Path) -> Any:
         return json.loads(path.read_text(encoding="utf-8"))
     except UnicodeDecodeError as error:
         raise ContractError(
-            f"{path}: is no text ({error.reason} at byte {error.start}); make it again"
+            f"{path}: is not text ({error.reason} at byte {error.start}); make it again"
         ) from error
     except json.JSONDecodeError as error:
         raise ContractError(
-            f"{path}: is no whole JSON document (line {error.lineno}, column {error.colno}:"
+            f"{path}: is not a whole JSON document (line {error.lineno}, column {error.colno}:"
             f" {error.msg}); make it again"
         ) from error
 

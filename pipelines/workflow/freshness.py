@@ -107,7 +107,7 @@ class Judge:
             elif (file.name, sha256(file)) not in recorded:
                 yield f"{self._name(file)} has changed"
         for name in () if step.takes_all else names - {file.name for file in step.inputs}:
-            yield f"{name} is no input any more"
+            yield f"{name} is no longer an input"
 
     def _remains(self, target: Path) -> Iterator[str]:
         """Yield the remains of a run that was killed or stopped early."""
