@@ -84,8 +84,10 @@ class Cogging(Effect):
         # Sine and cosine of every line come first, then the cycles of every line.
         lines = len(values) // 3
         for i in range(lines):
-            angle = values[2 * lines + i] * at.q[joint]
-            out[joint] += values[2 * i] * sin(angle) + values[2 * i + 1] * cos(angle)
+            # Columns have one amplitude at a time, and sines are slow.
+            if values[2 * i] != 0.0 or values[2 * i + 1] != 0.0:
+                angle = values[2 * lines + i] * at.q[joint]
+                out[joint] += values[2 * i] * sin(angle) + values[2 * i + 1] * cos(angle)
 
     def with_parts(self, number: int) -> "Cogging":
         """Return the effect with a number of lines."""

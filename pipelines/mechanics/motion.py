@@ -204,8 +204,8 @@ class Motion:
         return self._smoothed(np.where(np.isfinite(torque), torque, self.transmitted[0]))
 
     @cached_property
-    def columns_known(self) -> dict[Hashable, NDArray]:
-        """Columns (n, J, k) already computed along this motion, by effect.
+    def columns_known(self) -> dict[Hashable, tuple[tuple[float, ...], NDArray]]:
+        """The last shape, and its columns (n, J, k) along this motion, by effect.
 
         None depends on the loads.
         """

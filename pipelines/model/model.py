@@ -265,18 +265,20 @@ class Model:
 def _known_columns(effect: Effect, motion: Motion, shape: NDArray) -> NDArray:
     """Return an effect's columns along a motion, (n, J, k).
 
-    Columns that depend on the motion alone, such as friction's, are computed once and kept with the
-    motion.
+    Columns that do not depend on the loads are kept with the motion until the effect's shape is
+    another.
     """
     # Mostly, rigid bodies move differently from the motors, and that motion is new in each fit.
-    if effect.shape or effect.reads_load or effect.inertial:
+    if effect.reads_load or effect.inertial:
         return effect.columns(motion, shape)
-    # A diagnosis fits the same motion a thousand times.
-    if effect not in motion.columns_known:
-        motion.columns_known[effect] = columns = effect.columns(motion, shape)
+    # A diagnosis fits the same motion a thousand times, and moves one shape at a time.
+    at = tuple(shape)
+    known = motion.columns_known.get(effect)
+    if known is None or known[0] != at:
+        known = motion.columns_known[effect] = at, effect.columns(motion, shape)
         # Many fits share the array, and none of them may change it.
-        columns.flags.writeable = False
-    return motion.columns_known[effect]
+        known[1].flags.writeable = False
+    return known[1]
 
 
 def effect_named(name: str) -> type[Effect]:

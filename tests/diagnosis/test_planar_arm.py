@@ -1,12 +1,14 @@
 """A level arm of two links: what gravity alone would show is asked of no motion, all else is as of
 a leg."""
 
+import re
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from pipelines.diagnosis.candidates.candidate import proposals
+from pipelines.diagnosis.data_faults import find_faults
 from pipelines.diagnosis.diagnose import diagnose
 from pipelines.diagnosis.evidence.baseline import Baseline
 from pipelines.diagnosis.verdict.verdict import verdict
@@ -79,3 +81,28 @@ def test_what_turns_gravity_is_no_candidate_and_what_turns_the_elbow_is_one(arm)
     assert all(
         effect.possible(machine) for effect in EFFECTS if effect.name in ("rigid_body", "friction")
     )
+
+
+@pytest.mark.parametrize(
+    "times, kind, words",
+    [
+        (
+            (1.0, 10.0),
+            "unit",
+            r"shoulder_torque_nm .* or elbow_torque_nm is \(kgf·cm or lbf·in\?\)",
+        ),
+        ((0.001, 1.0), "unit", r"shoulder_torque_nm .* \(kN·m\?\), or elbow_torque_nm is"),
+        ((1.0, -1.0), "sign", "the sign of elbow_torque_nm is reversed"),
+    ],
+)
+def test_a_torque_of_another_unit_or_sign_is_named_by_the_link_that_both_drives_carry(
+    arm, times, kind, words
+):
+    faults = find_faults([replace(run, torque=run.torque * times) for run in arm])
+    assert {(fault.kind, bool(fault.spoils)) for fault in faults} == {(kind, True)}
+    assert all(re.search(words, fault.what) for fault in faults)
+
+
+@pytest.mark.parametrize("times", [(1.0, 1.0), (1.6, 1.0), (1.0, 0.6)])
+def test_a_gain_of_one_joint_is_no_other_unit(arm, times):
+    assert find_faults([replace(run, torque=run.torque * times) for run in arm]) == []

@@ -92,11 +92,13 @@ class Averages:
 
     @property
     def is_leg(self) -> bool:
-        """Whether the machine has a leg's equations under gravity."""
-        return self.motion.machine.mechanism is LEG
+        """Whether the machine has a leg's equations, with or without gravity."""
+        return self.motion.machine.mechanism.name == LEG.name
 
     def body(self, reading: Reading = AS_RECORDED) -> NDArray:
         """Return torque per unit of a leg's (X1 - X2, X2, X3, X4) under a reading.
+
+        Without gravity there is no X4.
 
         Parameters
         ----------
@@ -110,7 +112,9 @@ class Averages:
         """
         order, sign = reading
         q, dq, ddq = (x[:, list(order)] * sign for x in (self.q, self.dq, self.ddq))
-        return LEG.regressor(q, dq, ddq, self.motion.geometry) @ FROM_POSITIVE
+        columns = self.motion.machine.mechanism.regressor(q, dq, ddq, self.motion.geometry)
+        p = columns.shape[2]
+        return columns @ FROM_POSITIVE[:p, :p]
 
     def columns(self, joint: int, reading: Reading = AS_RECORDED) -> Columns:
         """Return the columns of one joint: rigid body, friction, and a law of its own angle.

@@ -143,25 +143,33 @@ class Scale:
     factor: float
     witness: str
     proof: Proof | None
+    or_other: bool = False
+    """Whether the other joint's torque may as well be wrong, by the inverse factor."""
 
     @property
     def fault(self) -> Fault:
         """The fault that it is."""
         channel = column(self.run.motion, self.joint, "torque")
-        like = [
-            unit
-            for unit, size in TORQUE_UNITS.items()
-            if 1 / SAME_UNIT < self.factor / size < SAME_UNIT
-        ]
-        guess = f" ({' or '.join(like)}?)" if like else ""
+        wrong = f"{channel} is in another unit than N·m{_like(self.factor)}"
+        if self.or_other:
+            other = column(self.run.motion, 1 - self.joint, "torque")
+            wrong += f", or {other} is{_like(1.0 / self.factor)}"
         return Fault(
             FaultKind.UNIT,
             self.run.motion.file,
             channel,
-            f"{channel} is in another unit than N·m{guess}: a factor of {self.factor:.3g} against"
-            f" {self.witness}, all along; {mend_in(self.run.motion, 'unit')}",
+            f"{wrong}: a factor of {self.factor:.3g} against {self.witness}, all along;"
+            f" {mend_in(self.run.motion, 'unit')}",
             proof=self.proof,
         )
+
+
+def _like(factor: float) -> str:
+    """Return the units of torque that are so many times smaller than 1 N·m, as a question."""
+    like = [
+        unit for unit, size in TORQUE_UNITS.items() if 1 / SAME_UNIT < factor / size < SAME_UNIT
+    ]
+    return f" ({' or '.join(like)}?)" if like else ""
 
 
 def torque_unit_faults(runs: Sequence[Averages]) -> Iterator[Fault]:
@@ -230,7 +238,7 @@ def _against_the_other_joint(run: Averages) -> list[Scale]:
     if min(moment, scale) <= 0.0:
         return []
     of_a_leg = run.motion.machine.is_exoskeleton
-    # The weight of another machine's second link is unknown: its first joint's torque is compared.
+    # The mass of another machine's second link is unknown: either joint may be in another unit.
     typical = SHANK_KG_M[run.motion.run] if of_a_leg else moment
     by_knee, by_hip = moment / typical, scale * moment / typical
     proof = _at_the_hip(run, scale)
@@ -245,7 +253,8 @@ def _against_the_other_joint(run: Averages) -> list[Scale]:
     # The joint that makes the shank less plausible is the one in another unit.
     if abs(np.log(by_knee)) > abs(np.log(by_hip)):
         return [Scale(run, 1, 1 / scale, f"{the(first)}, which carries the same {link}", proof)]
-    return [Scale(run, 0, scale, f"{the(second)}, which carries the same {link}", proof)]
+    witness = f"{the(second)}, which carries the same {link}"
+    return [Scale(run, 0, scale, witness, proof, or_other=not of_a_leg)]
 
 
 def shank(run: Averages) -> tuple[float, float]:
