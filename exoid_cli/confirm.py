@@ -64,7 +64,7 @@ def confirm(
 def ask_before(experiment: "Experiment", step: "Step", *, yes: bool) -> tuple[str, ...]:
     """Ask before a step that moves a real rig in a run that was not named on the command line.
 
-    Returns the arguments that its command needs besides.
+    Returns further arguments for its command.
     """
     from pipelines.settings.rig import load_rig
     from pipelines.settings.rig.recording_only import is_recording_only
@@ -103,8 +103,8 @@ class OperatorPrompt:
     def __init__(self) -> None:
         if not sys.stdin.isatty():
             raise InputError(
-                "--by-hand: standard input is no terminal, so no person can be asked; run it in a"
-                " terminal"
+                "--by-hand: standard input is not a terminal, so no person can be asked; run it in"
+                " a terminal"
             )
 
     async def ready(self, prompt: str) -> None:

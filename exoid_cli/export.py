@@ -11,7 +11,7 @@ from exoid_cli.experiment_folder import open_experiment, settings_in_force
 from exoid_cli.options import ConfigOption, files_argument
 
 if TYPE_CHECKING:
-    from pipelines.export import Exported, Format
+    from pipelines.export import ExportedModel, Format
 
 
 def export(
@@ -65,7 +65,7 @@ def export(
     _report(model_to_write, chosen, list(files))
 
 
-def _path(model: Path, output: Path | None, chosen: "Format[Exported]") -> Path:
+def _path(model: Path, output: Path | None, chosen: "Format[ExportedModel]") -> Path:
     """Return the file to write: ``output``, a file in that folder, or one next to the model."""
     from pipelines.errors import SettingsError
     from pipelines.export import FORMATS
@@ -84,7 +84,9 @@ def _path(model: Path, output: Path | None, chosen: "Format[Exported]") -> Path:
     return path
 
 
-def _texts(exported: "Exported", chosen: "Format[Exported]", path: Path) -> dict[Path, str]:
+def _texts(
+    exported: "ExportedModel", chosen: "Format[ExportedModel]", path: Path
+) -> dict[Path, str]:
     """Return the content of each file; the main one is ``path``, whatever its suffix."""
     files = {
         path.with_suffix(suffix): text for suffix, text in chosen.write(exported, path.stem).items()
@@ -95,7 +97,7 @@ def _texts(exported: "Exported", chosen: "Format[Exported]", path: Path) -> dict
     return files
 
 
-def _report(exported: "Exported", chosen: "Format[Exported]", files: list[Path]) -> None:
+def _report(exported: "ExportedModel", chosen: "Format[ExportedModel]", files: list[Path]) -> None:
     from pipelines.export import Degree
     from pipelines.export.exported import values_in_words
 
@@ -109,10 +111,10 @@ def _report(exported: "Exported", chosen: "Format[Exported]", files: list[Path])
         terms.append(about | {"parameters": values})
     written = [str(file) for file in files]
     result = {"to": chosen.name, "run": exported.run, "files": written}
-    console.emit(result | {"warnings": exported.driving(), "terms": terms})
+    console.emit(result | {"warnings": exported.friction_warnings(), "terms": terms})
     rows = [(term.effect.label, holding.degree, holding.how) for term, holding in holdings]
     console.table(("term", "in the file", "how"), rows)
-    for sentence in exported.driving():
+    for sentence in exported.friction_warnings():
         console.warn(sentence)
     for term, holding in holdings:
         if holding.degree is Degree.NOT:

@@ -16,7 +16,7 @@ from pipelines.errors import InputError
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from pipelines.identification import Extension, Identified
+    from pipelines.identification import Extension, IdentifiedModel
     from pipelines.mechanics.machine import Machine
     from pipelines.mechanics.run import Run
 
@@ -144,7 +144,7 @@ def _extension(
 
 
 def _write(
-    model: "Identified", output: Path, shared: "dict[str, Any]", *, figures: bool
+    model: "IdentifiedModel", output: Path, shared: "dict[str, Any]", *, figures: bool
 ) -> list[str]:
     """Write parameters, residuals and figures into a folder; return the figures' names."""
     from pipelines.contracts import PARAMETERS, RESIDUALS
@@ -176,13 +176,13 @@ def _write(
         return draw(RESIDUALS.scan(residuals_file), output)
 
 
-def _remarks(model: "Identified") -> dict[str, Any]:
+def _remarks(model: "IdentifiedModel") -> dict[str, Any]:
     """Return the sentences on a model for the metadata of its file."""
     names = ("collinear", "unrealizable", "remarks", "angle_noise")
     return {name: getattr(model, name) for name in names}
 
 
-def _report(model: "Identified", machine: "Machine") -> None:
+def _report(model: "IdentifiedModel", machine: "Machine") -> None:
     from pipelines.contracts.joints import either
 
     rows = model.parameters.to_dict("records")

@@ -13,7 +13,7 @@ from pipelines.errors import ContractError, InputError
 
 if TYPE_CHECKING:
     from pipelines.importing.finding import Finding
-    from pipelines.importing.recordings import Imported
+    from pipelines.importing.recordings import ImportedRecording
     from pipelines.settings.import_map import ImportMap
 
 
@@ -232,7 +232,7 @@ def _findings(log: dict[str, Any]) -> "list[Finding]":
     return list(dict.fromkeys(Finding.from_json(entry) for entry in entries))
 
 
-def _as_json(path: Path, recording: "Imported") -> dict[str, Any]:
+def _as_json(path: Path, recording: "ImportedRecording") -> dict[str, Any]:
     time = recording.columns["time_s"]
     return {
         "path": path,

@@ -170,7 +170,7 @@ class OperatorView:
 
 
 def plain_line(progress: "Progress") -> str:
-    """Return the progress in a line, for output that is no terminal."""
+    """Return the progress in a line, for output that is not a terminal."""
     urgent = "USE THE EMERGENCY STOP  " if progress.still_enabled else ""
     text = f"{urgent}{progress.state:<10} {progress.time_s:6.1f}/{progress.duration_s:.1f} s"
     if progress.row is not None:

@@ -11,7 +11,7 @@ from exoid_cli.experiment_folder import ExperimentFolder
 from pipelines.errors import InputError
 
 if TYPE_CHECKING:
-    from pipelines.workflow.freshness import Judged
+    from pipelines.workflow.freshness import JudgedStep
     from pipelines.workflow.graph import Step
 
 Before = Callable[["Step"], Sequence[str]]
@@ -97,7 +97,7 @@ def _check_inputs(folder: ExperimentFolder, wanted: "Sequence[Step]") -> None:
                 )
 
 
-def _run(context: typer.Context, judged: "Judged", more: Sequence[str]) -> dict[str, Any]:
+def _run(context: typer.Context, judged: "JudgedStep", more: Sequence[str]) -> dict[str, Any]:
     """Print a step's command line and its reason, then run the command; return it for programs."""
     name, *arguments = (*judged.step.command, *more)
     console.say_command(["exoid", name, *arguments], "; ".join(judged.why[:1]))

@@ -11,7 +11,7 @@ from exoid_cli.experiment_folder import open_experiment
 from exoid_cli.options import ConfigOption, OutOption
 
 if TYPE_CHECKING:
-    from pipelines.workflow.freshness import Judged
+    from pipelines.workflow.freshness import JudgedStep
 
 
 def status(config: ConfigOption = None, out: OutOption = None) -> None:
@@ -50,7 +50,7 @@ def status(config: ConfigOption = None, out: OutOption = None) -> None:
     console.say(f"\n{to_do if todo else 'Everything is up to date.'}")
 
 
-def _line(stage: "Sequence[Judged]", out: Path) -> tuple[str, str, str, str]:
+def _line(stage: "Sequence[JudgedStep]", out: Path) -> tuple[str, str, str, str]:
     count = Counter(one.state.value for one in stage)
     # A stage is as bad as its worst step.
     state = next(word for word in ("missing", "stale", "left out", "done") if count[word])
@@ -66,7 +66,7 @@ def _line(stage: "Sequence[Judged]", out: Path) -> tuple[str, str, str, str]:
     return step.stage, state, parts, why
 
 
-def _as_json(one: "Judged") -> dict[str, Any]:
+def _as_json(one: "JudgedStep") -> dict[str, Any]:
     return {
         "stage": one.step.stage,
         "target": one.step.target,

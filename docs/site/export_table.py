@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from pipelines.effects import EFFECTS, Effect
-from pipelines.export import FORMATS, Degree, Exported, Format
+from pipelines.export import FORMATS, Degree, ExportedModel, Format
 from pipelines.model import Term
 
 BEGIN, END = "<!-- written by `make docs` -->", "<!-- until here -->"
@@ -40,7 +40,7 @@ def _plausible(effect: type[Effect]) -> Term:
     return Term(bound, bound.values_from(np.array([np.mean(p.typical) for p in bound.parameters])))
 
 
-def _cell(format: Format[Exported], term: Term) -> str:
+def _cell(format: Format[ExportedModel], term: Term) -> str:
     holding = format.holding(term)
     if holding.degree is Degree.NOT:
         return f"– ({holding.how})"

@@ -131,7 +131,7 @@ class Table:
 
 
 @dataclass(frozen=True)
-class Stored:
+class StoredTable:
     """A table in a file, read and checked piece by piece."""
 
     contract: "Contract"
@@ -249,7 +249,7 @@ class Contract:
         self._apply_rules(rows, stored.metadata, str(path))
         return rows, stored.metadata
 
-    def scan(self, path: Path | str) -> Stored:
+    def scan(self, path: Path | str) -> StoredTable:
         """Return the table in a file; its rows are read and checked when they are used.
 
         Parameters
@@ -266,7 +266,7 @@ class Contract:
         _, metadata = parquet.header(path)
         self._refuse_other_contracts(metadata["contract"], path)
         self._check_metadata(metadata, str(path))
-        return Stored(self, metadata, path)
+        return StoredTable(self, metadata, path)
 
     def write(self, path: Path | str, frame: "pd.DataFrame", metadata: Mapping[str, Any]) -> None:
         """Check a table and write it atomically.

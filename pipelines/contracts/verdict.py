@@ -23,7 +23,7 @@ class _Object(BaseModel):
     model_config = ConfigDict(extra="allow")
 
 
-class Named(_Object):
+class EffectAtJoint(_Object):
     """An effect, and the joint that has it; null for the whole machine."""
 
     effect: str
@@ -53,7 +53,7 @@ class Gain(_Object):
     joint: str
 
 
-class Tie(Named):
+class Tie(EffectAtJoint):
     """A cause that these data cannot separate from a named one."""
 
     why: str
@@ -74,13 +74,13 @@ class OneRun(_Object):
     """Null for values fitted to this run alone; files of older versions lack it."""
 
 
-class Known(Named):
+class KnownEffect(EffectAtJoint):
     """An effect given as present, which is part of the baseline."""
 
     parameters: list[Parameter]
 
 
-class Cause(Named):
+class Cause(EffectAtJoint):
     """One named cause."""
 
     side: str
@@ -105,7 +105,7 @@ class Cause(Named):
         return [self, *self.indistinguishable_from]
 
 
-class Likely(Named):
+class LikelyCause(EffectAtJoint):
     """A listed cause that a finding could be."""
 
     family: str
@@ -143,7 +143,7 @@ class Finding(_Object):
     family: str | None
     probability: Probability
     words: str
-    causes: list[Likely]
+    causes: list[LikelyCause]
     laws: list[Law]
     path: list[Node] = Field(min_length=1)
 
@@ -290,7 +290,7 @@ class Verdict(_Object):
     reversals: list[Reversal] = []
     """Files of older versions lack it."""
     units: dict[str, dict[str, str]]
-    known: list[Known] = []
+    known: list[KnownEffect] = []
     """Files of older versions lack it."""
     causes: list[Cause]
     data_faults: list[Fault]
@@ -369,11 +369,11 @@ def parsed(path: Path) -> Any:
         return json.loads(path.read_text(encoding="utf-8"))
     except UnicodeDecodeError as error:
         raise ContractError(
-            f"{path}: is no text ({error.reason} at byte {error.start}); make it again"
+            f"{path}: is not text ({error.reason} at byte {error.start}); make it again"
         ) from error
     except json.JSONDecodeError as error:
         raise ContractError(
-            f"{path}: is no whole JSON document (line {error.lineno}, column {error.colno}:"
+            f"{path}: is not a whole JSON document (line {error.lineno}, column {error.colno}:"
             f" {error.msg}); make it again"
         ) from error
 

@@ -174,21 +174,21 @@ def _let_fly(
     report: Callable[[float, float], None],
 ) -> str:
     """Move the swarm until it stagnates, and return the reason for the end."""
-    iterations_per_look = 25
-    # Number of looks without this relative gain after which the swarm stops.
+    iterations_per_check = 25
+    # Checks without this relative gain after which the swarm stops.
     patience, least_gain = 8, 1e-4
     best, last_gain = swarm.best_cost.min(), 0
-    looks = -(-settings.iterations // iterations_per_look)
-    for look in range(looks):
-        fly(swarm, problem, settings.topology == "ring", iterations_per_look, rng)
+    checks = -(-settings.iterations // iterations_per_check)
+    for check in range(checks):
+        fly(swarm, problem, settings.topology == "ring", iterations_per_check, rng)
         lowest = swarm.best_cost.min()
         # The right side is NaN while best is infinite, and then any cost is a gain.
         if not lowest >= best - least_gain * abs(best):
-            best, last_gain = lowest, look
-        report((look + 1) / looks, lowest)
+            best, last_gain = lowest, check
+        report((check + 1) / checks, lowest)
         if time.monotonic() > deadline:
             return "seconds"
-        if look - last_gain >= patience:
+        if check - last_gain >= patience:
             return "stagnation"
     return "iterations"
 

@@ -47,7 +47,7 @@ def diagnose(
     report : callable, optional
         Takes the share that is done, 0 to 1, and the present step.
     known : sequence of str, optional
-        Labels of effects that the machine is known to have besides rigid body and friction.
+        Labels of effects that the machine is known to have, without rigid body and friction.
     accept : sequence of FaultKind, optional
         Kinds of faults of acquisition whose veto the user overrules.
 

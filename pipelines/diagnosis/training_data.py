@@ -19,7 +19,7 @@ from pipelines.errors import InputError
 from pipelines.estimation.angle_noise import CUTOFF_HZ, is_loud
 from pipelines.mechanics.even_grid import on_even_grid
 from pipelines.mechanics.motion import Motion
-from pipelines.mechanics.origin import giving
+from pipelines.mechanics.origin import how_to_add
 from pipelines.mechanics.scale import on_one_scale
 
 
@@ -60,7 +60,7 @@ def training_data(
     motions : sequence of Motion
         Runs of one machine, some to train and some to validate.
     known : sequence of str
-        Labels of effects that the machine is known to have besides rigid body and friction.
+        Labels of effects that the machine is known to have, without rigid body and friction.
     accept : sequence of FaultKind
         Kinds of faults of acquisition whose veto the user overrules.
 
@@ -141,8 +141,8 @@ def _refuse_missing_purpose(motions: Sequence[Motion], faults: Sequence[Fault]) 
         if not any(m.purpose == purpose for m in motions):
             wrong = "".join(f"; {f.file}: {f.in_words}" for f in faults if f.samples is not None)
             raise InputError(
-                f"found no run to {purpose} on among: {listed}; {why}: {giving(purpose, motions)}"
-                f"{wrong}"
+                f"found no run to {purpose} on among: {listed}; {why}:"
+                f" {how_to_add(purpose, motions)}{wrong}"
             )
     trained = {m.run for m in motions if m.purpose == "train"}
     strangers = [m.file for m in motions if m.purpose == "validate" and m.run not in trained]

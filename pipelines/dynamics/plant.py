@@ -69,8 +69,8 @@ def make_plant(model: Model, geometry: Geometry, joints: tuple[Joint, ...], run:
             whose = "machine"
             remedy = "from richer motions, with the signs of torque and angle as they should be"
         raise InputError(
-            f"the {run} parameters are no real {whose}: {'; '.join(reasons)}. Its simulation"
-            f" diverges; identify again {remedy}, or choose another --run"
+            f"the {run} parameters are not those of a real {whose}: {'; '.join(reasons)}. Its"
+            f" simulation diverges; identify again {remedy}, or choose another --run"
         )
     return Plant(model, geometry, joints, run, assembly)
 

@@ -26,7 +26,7 @@ class ClosedLoop:
     """(n, J) rad."""
     run: RbfRun
     joints: tuple[Joint, ...]
-    asked: int
+    requested: int
     """Number of samples requested; n is smaller if a joint ran away."""
 
     @property
@@ -55,7 +55,7 @@ class ClosedLoop:
     @property
     def ran_away(self) -> str:
         """The joint that ran away, and when, in words; empty if none did."""
-        if len(self.time) == self.asked:
+        if len(self.time) == self.requested:
             return ""
         # The first joint whose last angle is not within a turn; NaN is not, either.
         joint = self.joints[int(np.argmin(np.abs(self.run.angle[-1]) < TURN))]

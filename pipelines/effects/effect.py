@@ -102,7 +102,7 @@ class Parameter:
     default: float | None = None
     """Default value; a shape parameter that has one may be held in a fit."""
     forms: tuple[float, ...] = ()
-    """Values of the known members of a family of shapes; empty if there are none besides the
+    """Values of the known members of a family of shapes; empty if there is only the
     range."""
     between_forms: bool = True
     """False if only the forms exist, as for a sign or a switch."""

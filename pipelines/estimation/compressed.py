@@ -17,7 +17,7 @@ from pipelines.estimation.regression import Regression
 
 
 @dataclass(frozen=True)
-class Compressed:
+class CompressedRows:
     """Usable rows of some runs, r per joint: ``torque = regressor @ parameters + noise``."""
 
     regressor: NDArray
@@ -28,7 +28,7 @@ class Compressed:
     """(J,) number of rows before compression."""
 
 
-def compress(regressions: Iterable[Regression]) -> Compressed:
+def compress(regressions: Iterable[Regression]) -> CompressedRows:
     """Compress the usable rows of all pieces of some runs.
 
     Parameters
@@ -38,7 +38,7 @@ def compress(regressions: Iterable[Regression]) -> Compressed:
 
     Returns
     -------
-    Compressed
+    CompressedRows
         At most p + 1 rows per joint, zeros where a joint has fewer.
     """
     triangles: list[NDArray] = []
@@ -56,35 +56,35 @@ def compress(regressions: Iterable[Regression]) -> Compressed:
     # A joint with few usable rows has fewer than there are columns; zeros fill them up.
     width = triangles[0].shape[1]
     every = np.stack([np.pad(t, ((0, width - len(t)), (0, 0))) for t in triangles])
-    return Compressed(every[:, :, :-1], every[:, :, -1], np.asarray(count))
+    return CompressedRows(every[:, :, :-1], every[:, :, -1], np.asarray(count))
 
 
-def together(parts: Sequence[Compressed]) -> Compressed:
+def together(parts: Sequence[CompressedRows]) -> CompressedRows:
     """Return the rows of several regressions as one.
 
     Parameters
     ----------
-    parts : sequence of Compressed
+    parts : sequence of CompressedRows
         Of the same J joints and p columns.
 
     Returns
     -------
-    Compressed
+    CompressedRows
         With all rows of ``parts``; counts are added.
     """
-    return Compressed(
+    return CompressedRows(
         np.concatenate([part.regressor for part in parts], axis=1),
         np.concatenate([part.torque for part in parts], axis=1),
         np.sum([part.count for part in parts], axis=0),
     )
 
 
-def normal_equations(rows: Compressed, weights: NDArray) -> tuple[NDArray, NDArray]:
+def normal_equations(rows: CompressedRows, weights: NDArray) -> tuple[NDArray, NDArray]:
     """Return the normal equations over all usable rows.
 
     Parameters
     ----------
-    rows : Compressed
+    rows : CompressedRows
         Rows of J joints on p columns.
     weights : (J,) array
         Weight of each joint.
@@ -100,12 +100,12 @@ def normal_equations(rows: Compressed, weights: NDArray) -> tuple[NDArray, NDArr
     return gram, np.einsum("j,jri,jr->i", weights, rows.regressor, rows.torque)
 
 
-def residual_rms(rows: Compressed, values: NDArray) -> NDArray:
+def residual_rms(rows: CompressedRows, values: NDArray) -> NDArray:
     """Return the root mean square residual of each joint over usable rows, (J,) N·m.
 
     Parameters
     ----------
-    rows : Compressed
+    rows : CompressedRows
         Rows of J joints on p columns.
     values : (p,) array
         Parameters.

@@ -133,7 +133,7 @@ def _of_outliers(shares: Mapping[str, float]) -> tuple[str, ...]:
     )
 
 
-class _Iterated(NamedTuple):
+class _LastIteration(NamedTuple):
     """The values at the end of an iteration."""
 
     values: NDArray
@@ -146,7 +146,7 @@ class _Iterated(NamedTuple):
 
 def _iterated(
     problem: Problem, values: NDArray, scale: NDArray, loss: Loss, most: int
-) -> _Iterated:
+) -> _LastIteration:
     """Fit and weight in turn until the values converge; the bisquare's scale is held."""
     # Largest change of a value at convergence, in standard errors of independent blocks.
     settled = 1e-3
@@ -162,8 +162,8 @@ def _iterated(
         if loss is Huber:
             scale = sums.scale
         if np.all(np.abs(values - before) < settled * np.sqrt(np.diag(sensitivity))):
-            return _Iterated(values, scale, iteration, settled=True)
-    return _Iterated(values, scale, most, settled=False)
+            return _LastIteration(values, scale, iteration, settled=True)
+    return _LastIteration(values, scale, most, settled=False)
 
 
 def _sums(problem: Problem, values: NDArray, scale: NDArray, loss: Loss) -> Sums:

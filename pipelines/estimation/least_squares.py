@@ -11,7 +11,7 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from pipelines.estimation.compressed import Compressed, normal_equations, residual_rms
+from pipelines.estimation.compressed import CompressedRows, normal_equations, residual_rms
 from pipelines.estimation.estimator import Estimator, Fit, carry_of
 from pipelines.estimation.normal_matrix import inverse
 from pipelines.estimation.problem import Problem
@@ -27,7 +27,7 @@ class WeightedLeastSquares(Estimator):
     name = "weighted_least_squares"
     short = "wls"
     title = "weighted least squares"
-    passes = 3
+    reweightings = 3
     """Number of times that the joints are weighted again."""
 
     def fit(self, problem: Problem) -> Fit:
@@ -45,7 +45,7 @@ class WeightedLeastSquares(Estimator):
         """
         rows, held = problem.rows, problem.of_held
         # Held parameters act through their torque alone: friction, in the step of the wearer.
-        free = Compressed(
+        free = CompressedRows(
             rows.regressor[:, :, problem.fitted],
             rows.torque - rows.regressor[:, :, held] @ problem.held[held],
             rows.count,
@@ -66,10 +66,10 @@ class WeightedLeastSquares(Estimator):
             {"joint_weights_1_nm2": weights.tolist()},
         )
 
-    def _weights(self, rows: Compressed, names: list[str]) -> NDArray:
+    def _weights(self, rows: CompressedRows, names: list[str]) -> NDArray:
         # Feasible generalised least squares, which begins with equal weights.
         weights = np.ones(len(rows.count))
-        for _ in range(self.passes):
+        for _ in range(self.reweightings):
             normal, right = normal_equations(rows, weights)
             values = inverse(normal, names) @ right
             weights = 1.0 / np.maximum(residual_rms(rows, values), LEAST_NM) ** 2
@@ -82,7 +82,7 @@ class OrdinaryLeastSquares(WeightedLeastSquares):
     name = "ordinary_least_squares"
     short = "ols"
     title = "ordinary least squares"
-    passes = 0
+    reweightings = 0
 
 
 def _scores(

@@ -7,7 +7,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from pipelines.estimation.compressed import Compressed, compress, together
+from pipelines.estimation.compressed import CompressedRows, compress, together
 from pipelines.estimation.regression import Regression, regressions
 from pipelines.mechanics.run import Run, kinds_of
 from pipelines.mechanics.silence import silent_torque
@@ -200,7 +200,7 @@ class Training:
         return inertias
 
     @cached_property
-    def compressed(self) -> tuple[Compressed, ...]:
+    def compressed(self) -> tuple[CompressedRows, ...]:
         """Rows of each run on all columns, computed once for every fit.
 
         Raises
@@ -252,7 +252,7 @@ class Problem:
         ]
 
     @property
-    def rows(self) -> Compressed:
+    def rows(self) -> CompressedRows:
         """All usable rows of these runs on all columns, compressed."""
         return together([self.training.compressed[number] for number, _ in self.runs])
 

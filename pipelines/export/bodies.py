@@ -26,7 +26,7 @@ from numpy.typing import NDArray
 from pipelines.contracts import Joint
 from pipelines.effects import Element
 from pipelines.errors import InputError
-from pipelines.export.exported import Exported
+from pipelines.export.exported import ExportedModel
 from pipelines.mechanics.mechanism import Mechanism
 from pipelines.mechanics.mechanisms.leg import LEG, LEVEL_LEG
 from pipelines.mechanics.mechanisms.single import LIFT, PENDULUM, SLIDE, TURNTABLE
@@ -76,7 +76,7 @@ class Body:
         return self.beyond * np.array(self.lies) + 0.0
 
 
-def bodies(exported: Exported) -> tuple[Body, ...]:
+def bodies(exported: ExportedModel) -> tuple[Body, ...]:
     """Return the machine's bodies, from the base on.
 
     Raises
@@ -85,7 +85,7 @@ def bodies(exported: Exported) -> tuple[Body, ...]:
         If no bodies have such X, because only rotor inertia makes the mass matrix positive
         definite; or if the mechanism has no rule for its bodies.
     """
-    bodies_of: dict[Mechanism, Callable[[Exported], tuple[Body, ...]]] = {
+    bodies_of: dict[Mechanism, Callable[[ExportedModel], tuple[Body, ...]]] = {
         LEG: _leg,
         LEVEL_LEG: _level_leg,
         PENDULUM: _pendulum,
@@ -102,13 +102,13 @@ def bodies(exported: Exported) -> tuple[Body, ...]:
     return bodies_of[mechanism](exported)
 
 
-def _level_leg(exported: Exported) -> tuple[Body, ...]:
+def _level_leg(exported: ExportedModel) -> tuple[Body, ...]:
     return tuple(
         replace(body, axis=(0.0, 0.0, 1.0), lies=(1.0, 0.0, 0.0)) for body in _leg(exported)
     )
 
 
-def _leg(exported: Exported) -> tuple[Body, ...]:
+def _leg(exported: ExportedModel) -> tuple[Body, ...]:
     """Return two links; without X4 (no gravity) the first link's centre is on its axis."""
     X1, X2, X3, *X4 = exported.X
     hip, knee = exported.joints
@@ -137,7 +137,7 @@ def _leg(exported: Exported) -> tuple[Body, ...]:
     return thigh, shank
 
 
-def _pendulum(exported: Exported) -> tuple[Body, ...]:
+def _pendulum(exported: ExportedModel) -> tuple[Body, ...]:
     (joint,), (X1, X2), (shift,) = exported.joints, exported.X, exported.shift()
     across = _moment_across(exported, joint)
     moment = np.hypot(X2, across)
@@ -146,13 +146,13 @@ def _pendulum(exported: Exported) -> tuple[Body, ...]:
     return (Body(joint, mass, X1 - moment**2 / mass, across / mass, X2 / mass, shift=shift),)
 
 
-def _turntable(exported: Exported) -> tuple[Body, ...]:
+def _turntable(exported: ExportedModel) -> tuple[Body, ...]:
     (joint,), (X1,), (shift,) = exported.joints, exported.X, exported.shift()
     # No torque depends on its mass.
     return (Body(joint, 1.0, X1, axis=(0.0, 0.0, 1.0), shift=shift),)
 
 
-def _lift(exported: Exported) -> tuple[Body, ...]:
+def _lift(exported: ExportedModel) -> tuple[Body, ...]:
     (joint,), (mass, weight), (shift,) = exported.joints, exported.X, exported.shift()
     # X2 is the weight less a counterweight's; a share without gravity takes the latter's place.
     carried = 1.0 - weight / (mass * exported.geometry.gravity_m_s2)
@@ -160,7 +160,7 @@ def _lift(exported: Exported) -> tuple[Body, ...]:
     return (Body(joint, mass, _cube(mass), axis=up, shift=shift, carried=carried),)
 
 
-def _slide(exported: Exported) -> tuple[Body, ...]:
+def _slide(exported: ExportedModel) -> tuple[Body, ...]:
     (joint,), (mass,), (shift,) = exported.joints, exported.X, exported.shift()
     return (Body(joint, mass, _cube(mass), axis=(1.0, 0.0, 0.0), shift=shift),)
 
@@ -170,6 +170,6 @@ def _cube(mass: float) -> float:
     return mass * 0.1**2 / 6.0
 
 
-def _moment_across(exported: Exported, joint: Joint) -> float:
+def _moment_across(exported: ExportedModel, joint: Joint) -> float:
     term = exported.of(Element.MASS_ACROSS, joint.name)
     return float(term.values[0]) if term else 0.0

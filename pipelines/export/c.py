@@ -3,7 +3,7 @@
 from collections.abc import Callable, Iterable, Mapping
 
 from pipelines.export.equations import GROUPS, Equation, equations, holding
-from pipelines.export.exported import Exported
+from pipelines.export.exported import ExportedModel
 from pipelines.export.format import Format
 from pipelines.export.language import Language, filled, function_name, indented, one_line
 
@@ -21,7 +21,7 @@ LANGUAGE = Language(
 )
 
 
-def _write(exported: Exported, stem: str) -> Mapping[str, str]:
+def _write(exported: ExportedModel, stem: str) -> Mapping[str, str]:
     """Return header and source; their functions start with the file's name."""
     model, name = equations(exported), function_name(stem, ".c")
     joints = len(model.joints)

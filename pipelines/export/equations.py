@@ -11,7 +11,7 @@ from typing import Any
 from pipelines.contracts import Joint
 from pipelines.effects import Side
 from pipelines.effects.kernel import Instant
-from pipelines.export.exported import Exported, column_of, shift_of
+from pipelines.export.exported import ExportedModel, column_of, shift_of
 from pipelines.export.format import Degree, Holding, exact, left_out
 from pipelines.export.formula import (
     Branch,
@@ -107,12 +107,12 @@ def holding(term: Term) -> Holding:
     )
 
 
-def equations(exported: Exported) -> Equations:
+def equations(exported: ExportedModel) -> Equations:
     """Return the equations of a model.
 
     Parameters
     ----------
-    exported : Exported
+    exported : ExportedModel
         Terms that no equation holds are left out.
 
     Returns

@@ -24,7 +24,7 @@ from pipelines.model import Model, Term, model_from_parameters
 
 
 @dataclass(frozen=True)
-class Exported:
+class ExportedModel:
     """A model to export, with all values."""
 
     model: Model
@@ -67,7 +67,7 @@ class Exported:
         """Return each term of the file and how the format holds it."""
         return [(term, format.holding(term)) for term in self.terms] + list(self.absent)
 
-    def driving(self) -> list[str]:
+    def friction_warnings(self) -> list[str]:
         """Return a warning for each negative friction coefficient, which drives its joint."""
         return [
             f"{term.effect.label}: {p.name} = {value:.3g} {p.unit} is negative: it drives the"
@@ -99,7 +99,7 @@ class Exported:
             )
         yield "SI units; angles as the encoders give them, torques as the drives deliver them"
         yield ""
-        yield from (f"WARNING: {sentence}" for sentence in self.driving())
+        yield from (f"WARNING: {sentence}" for sentence in self.friction_warnings())
         for term, holding in self.holdings(format):
             yield f"{term.effect.label}: {holding.degree} ({holding.how})"
             if holding.degree is not Degree.EXACT:
@@ -148,7 +148,7 @@ def values_in_words(term: Term) -> str:
 
 def exported(
     table: Table, run: str | None = None, default_geometry: Geometry | None = None
-) -> Exported:
+) -> ExportedModel:
     """Return the model of one kind of run from a ``parameters/1`` table.
 
     Parameters
@@ -189,7 +189,7 @@ def exported(
         rigid = [term for term in acting if term.effect.spring is None or term.effect.at_cuff]
         # Refuses models that no real machine has.
         make_plant(Model(tuple(rigid)), geometry, machine.joints, kind)
-    return Exported(acting, tuple(absent), run, geometry, machine, table)
+    return ExportedModel(acting, tuple(absent), run, geometry, machine, table)
 
 
 def _why_absent(term: Term, run: str, has_cuffs: bool) -> str:

@@ -9,12 +9,12 @@ import pandas as pd
 from pipelines.contracts import Joint
 from pipelines.contracts.provenance import describe
 from pipelines.effects.reference import facts
-from pipelines.export.exported import Exported
+from pipelines.export.exported import ExportedModel
 from pipelines.export.format import Format, exact
 from pipelines.model import Term
 
 
-def _write(exported: Exported, stem: str) -> Mapping[str, str]:
+def _write(exported: ExportedModel, stem: str) -> Mapping[str, str]:
     """Return the document's text."""
     table, mechanism = exported.table, exported.machine.mechanism
     document = {

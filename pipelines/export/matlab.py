@@ -4,7 +4,7 @@ import re
 from collections.abc import Callable, Iterable, Mapping
 
 from pipelines.export.equations import GROUPS, Equation, Equations, equations, holding
-from pipelines.export.exported import Exported
+from pipelines.export.exported import ExportedModel
 from pipelines.export.format import Format
 from pipelines.export.language import Language, filled, function_name, indented, one_line
 
@@ -23,7 +23,7 @@ LANGUAGE = Language(
 )
 
 
-def _write(exported: Exported, stem: str) -> Mapping[str, str]:
+def _write(exported: ExportedModel, stem: str) -> Mapping[str, str]:
     """Return the function file."""
     model = equations(exported)
     joints = len(model.joints)

@@ -14,7 +14,7 @@ from pipelines.contracts import Joint
 from pipelines.dynamics.assembly import motor_inertia
 from pipelines.effects import Element
 from pipelines.export.bodies import NOMINAL, Body, bodies
-from pipelines.export.exported import Exported
+from pipelines.export.exported import ExportedModel
 from pipelines.export.format import Degree, Format, Holding, approximate
 from pipelines.export.holding import held_friction, holding_from
 from pipelines.export.language import one_line, unique
@@ -29,7 +29,7 @@ def _friction(term: Term) -> Holding:
     return held_friction(term, approximate(how))
 
 
-def _write(exported: Exported, stem: str) -> Mapping[str, str]:
+def _write(exported: ExportedModel, stem: str) -> Mapping[str, str]:
     """Return the model's text."""
     root = ET.Element("mujoco", model=one_line(stem))
     ET.SubElement(root, "compiler", angle="radian")
@@ -54,7 +54,9 @@ def _write(exported: Exported, stem: str) -> Mapping[str, str]:
     return {".xml": document(root, [*exported.heading(MJCF), "", masses])}
 
 
-def _body(parent: ET.Element, name: str, twist: str, body: Body, exported: Exported) -> ET.Element:
+def _body(
+    parent: ET.Element, name: str, twist: str, body: Body, exported: ExportedModel
+) -> ET.Element:
     element = ET.SubElement(parent, "body", {"name": f"{name}_link"} | _frame(body))
     kind = "hinge" if body.joint.kind == "revolute" else "slide"
     hinge = {"type": kind, "axis": numbers(*body.axis)}
@@ -91,7 +93,7 @@ def _frame(body: Body) -> dict[str, str]:
     return {"pos": numbers(*body.place), "quat": quat} | carried
 
 
-def _joint(body: Body, exported: Exported) -> dict[str, str]:
+def _joint(body: Body, exported: ExportedModel) -> dict[str, str]:
     """Return friction and rotor inertia of a drive as attributes of its joint."""
     name, attributes = body.joint.name, {}
     damping = [0.0, 0.0]
@@ -115,7 +117,7 @@ def _joint(body: Body, exported: Exported) -> dict[str, str]:
     return attributes | ({"armature": number(armature)} if armature else {})
 
 
-def _spring(joint: Joint, shift: float, exported: Exported) -> dict[str, str]:
+def _spring(joint: Joint, shift: float, exported: ExportedModel) -> dict[str, str]:
     spring = exported.of(Element.SPRING, joint.name)
     if spring is None:
         return {}
@@ -123,7 +125,7 @@ def _spring(joint: Joint, shift: float, exported: Exported) -> dict[str, str]:
     return {"stiffness": number(stiffness), "springref": number(rest + shift)}
 
 
-def _twist(joint: Joint, exported: Exported) -> dict[str, str]:
+def _twist(joint: Joint, exported: ExportedModel) -> dict[str, str]:
     """Return the joint between motor and link, whose angle is minus the transmission's twist."""
     soft = exported.of(Element.SERIES_SPRING, joint.name)
     if soft is None:
@@ -136,7 +138,7 @@ def _twist(joint: Joint, exported: Exported) -> dict[str, str]:
 
 
 def _spring_across(
-    springs: ET.Element, names: tuple[str, str], joint: Joint, exported: Exported
+    springs: ET.Element, names: tuple[str, str], joint: Joint, exported: ExportedModel
 ) -> None:
     """Add the spring of a link behind an elastic joint, whose angle is a sum of two."""
     if exported.of(Element.SERIES_SPRING, joint.name) is None:
@@ -150,7 +152,7 @@ def _spring_across(
             ET.SubElement(across, "joint", joint=part, coef="1")
 
 
-def _actuator(actuators: ET.Element, name: str, joint: Joint, exported: Exported) -> None:
+def _actuator(actuators: ET.Element, name: str, joint: Joint, exported: ExportedModel) -> None:
     gain = exported.of(Element.TORQUE_GAIN, joint.name)
     offset = exported.of(Element.TORQUE_OFFSET, joint.name)
     if gain is None and offset is None:

@@ -12,7 +12,7 @@ import numpy as np
 
 from pipelines.effects import Element
 from pipelines.export.bodies import NOMINAL, Body, bodies
-from pipelines.export.exported import Exported
+from pipelines.export.exported import ExportedModel
 from pipelines.export.format import Degree, Format, Holding, exact
 from pipelines.export.holding import held_friction, holding_from
 from pipelines.export.language import one_line, unique
@@ -25,7 +25,7 @@ def _friction(term: Term) -> Holding:
     return held_friction(term, exact(how))
 
 
-def _write(exported: Exported, stem: str) -> Mapping[str, str]:
+def _write(exported: ExportedModel, stem: str) -> Mapping[str, str]:
     """Return the model's text."""
     root = ET.Element("robot", name=one_line(stem))
     joints = unique(one_line(joint.name) for joint in exported.joints)
@@ -55,7 +55,7 @@ def _link(root: ET.Element, name: str, body: Body) -> None:
 
 
 def _joint(
-    root: ET.Element, name: str, parent: str, link: str, body: Body, exported: Exported
+    root: ET.Element, name: str, parent: str, link: str, body: Body, exported: ExportedModel
 ) -> None:
     joint = ET.SubElement(root, "joint", name=name, type=body.joint.kind)
     # Set back by the encoder's shift.

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 
 from pipelines.errors import InputError
-from pipelines.mechanics.origin import giving
+from pipelines.mechanics.origin import how_to_add
 from pipelines.mechanics.run import Run, kinds_of
 
 
@@ -22,12 +22,12 @@ def train_and_validate(runs: Sequence[Run]) -> tuple[list[Run], list[Run]]:
     if "exo_alone" not in kinds:
         raise InputError(
             f"found no exo_alone run to train on among: {listed}; friction is fitted with nobody in"
-            f" the machine: {giving('train', runs)}"
+            f" the machine: {how_to_add('train', runs)}"
         )
     if not judged:
         raise InputError(
             f"found no run to validate on among: {listed}; a fit is judged on data it has not seen:"
-            f" {giving('validate', runs)}"
+            f" {how_to_add('validate', runs)}"
         )
     if not any(run.run in kinds for run in judged):
         raise InputError(

@@ -41,7 +41,7 @@ FitT = TypeVar("FitT", bound=Fit, covariant=True)
 
 
 @dataclass(frozen=True)
-class Identified:
+class IdentifiedModel:
     """The result of an identification, with its uncertainty and remarks."""
 
     parameters: pd.DataFrame
@@ -107,7 +107,7 @@ def identify(
     extension: Extension | None = None,
     *,
     reversals: bool = False,
-) -> Identified:
+) -> IdentifiedModel:
     """Identify friction, the exoskeleton's rigid body and, from runs with one, the human's.
 
     Parameters
@@ -154,7 +154,7 @@ def identify(
     )
     # One fit of all columns is the check: friction that changes with a wearer shows there.
     everything = Problem(training, training.kinds, np.arange(len(values)), np.zeros(len(values)))
-    return Identified(
+    return IdentifiedModel(
         parameters=table,
         covariance=covariance,
         one_step=np.array([row.value for row in rows(training, estimator.fit(everything).values)]),

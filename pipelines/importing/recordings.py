@@ -32,7 +32,7 @@ Begins = dict[str, tuple[float, str]]
 
 
 @dataclass(frozen=True)
-class Imported:
+class ImportedRecording:
     """A recording made of a log, not yet written."""
 
     name: str
@@ -56,7 +56,7 @@ class Imported:
 
 def recordings(
     path: Path, settings: ImportMap, map_path: Path, begins: Begins
-) -> Iterator[Imported]:
+) -> Iterator[ImportedRecording]:
     """Yield the recordings that a map makes of a log, and add its counters to ``begins``.
 
     Raises
@@ -138,7 +138,7 @@ def _recordings_of(
     settings: ImportMap,
     wanted: Sequence[RecordingSettings],
     begins: Begins,
-) -> Iterator[Imported]:
+) -> Iterator[ImportedRecording]:
     path, findings = log.source.path, [*log.findings, *run.findings]
     columns = log.quantities(run, findings)
     if settings.time.keep == "new":
@@ -179,7 +179,7 @@ def _recordings_of(
             "rows": [int(in_source[0]), int(in_source[-1])],
         }
         metadata = _metadata(settings, recording, cut) | {"imported": imported}
-        yield Imported(recording.name_of(path) + suffix, own, metadata)
+        yield ImportedRecording(recording.name_of(path) + suffix, own, metadata)
 
 
 def _whole_rows(

@@ -24,7 +24,7 @@ def remedy_for_repeats(run: Run) -> str:
     return "wait for new data before reading"
 
 
-def giving(purpose: str, runs: Sequence[Run]) -> str:
+def how_to_add(purpose: str, runs: Sequence[Run]) -> str:
     """Explain how to add a run for a purpose to a session."""
     if any("imported" in run.metadata for run in runs):
         return (

@@ -143,6 +143,6 @@ def _tls_context(line: TlsLine) -> ssl.SSLContext:
             context.load_verify_locations(file)
     except OSError as error:  # SSLError is one
         raise SettingsError(
-            f"{file}: is no certificate that can be used ({error.strerror or error})"
+            f"{file}: is not a usable certificate ({error.strerror or error})"
         ) from error
     return context

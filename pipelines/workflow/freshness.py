@@ -30,7 +30,7 @@ class Freshness(Enum):
 
 
 @dataclass(frozen=True)
-class Judged:
+class JudgedStep:
     """A step with its state."""
 
     step: Step
@@ -50,21 +50,23 @@ class Judge:
 
     out: Path
     """Folder of the results; messages name files relative to it."""
-    _makers: dict[Path, Judged] = field(default_factory=dict)
+    _makers: dict[Path, JudgedStep] = field(default_factory=dict)
 
-    def all(self, steps: Sequence[Step]) -> list[Judged]:
+    def all(self, steps: Sequence[Step]) -> list[JudgedStep]:
         """Return every step with its state."""
         judged = [self.judge(step) for step in steps]
         # A missing result that is an input of a finished step is not due: that step did without it.
         used = {file for one in judged if one.done for file in one.step.inputs}
         return [_left_out(one) if one.step.target in used else one for one in judged]
 
-    def judge(self, step: Step) -> Judged:
+    def judge(self, step: Step) -> JudgedStep:
         """Return a step with its state, after the steps that make its inputs were judged."""
         state = Freshness.STALE if step.target.exists() else Freshness.MISSING
         reasons = self._reasons(step) if step.target.exists() else self._remains(step.target)
         why = tuple(dict.fromkeys(reasons))
-        judged = Judged(step, state if why or state is Freshness.MISSING else Freshness.DONE, why)
+        judged = JudgedStep(
+            step, state if why or state is Freshness.MISSING else Freshness.DONE, why
+        )
         self._makers.update(dict.fromkeys(step.makes, judged))
         return judged
 
@@ -105,7 +107,7 @@ class Judge:
             elif (file.name, sha256(file)) not in recorded:
                 yield f"{self._name(file)} has changed"
         for name in () if step.takes_all else names - {file.name for file in step.inputs}:
-            yield f"{name} is no input any more"
+            yield f"{name} is no longer an input"
 
     def _remains(self, target: Path) -> Iterator[str]:
         """Yield the remains of a run that was killed or stopped early."""
@@ -120,10 +122,12 @@ class Judge:
         return (file.relative_to(self.out) if file.is_relative_to(self.out) else file).as_posix()
 
 
-def _left_out(judged: Judged) -> Judged:
+def _left_out(judged: JudgedStep) -> JudgedStep:
     if not judged.step.may_fail or judged.state is not Freshness.MISSING:
         return judged
-    return Judged(judged.step, Freshness.LEFT_OUT, (f"`exoid run {judged.step.stage}` says why",))
+    return JudgedStep(
+        judged.step, Freshness.LEFT_OUT, (f"`exoid run {judged.step.stage}` says why",)
+    )
 
 
 def _other_settings(then: Mapping[str, Any], now: Mapping[str, Any], at: str = "") -> Iterator[str]:

@@ -114,6 +114,7 @@ def test_a_leg_that_cannot_be_is_refused_with_file_and_reason(exoid, model, tmp_
     outcome = exoid("export", path, "--to", "mjcf")
     assert (
         outcome.code == 2
-        and "unreal.parquet: the with_human parameters are no real leg: X2 (X1 - X2)" in outcome.err
+        and "unreal.parquet: the with_human parameters are not those of a real leg: X2 (X1 - X2)"
+        in outcome.err
     )
     assert [p.name for p in tmp_path.iterdir()] == ["unreal.parquet"]

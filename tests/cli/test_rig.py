@@ -42,7 +42,7 @@ def test_a_rig_file_that_cannot_be_used_is_exit_code_2(exoid, tmp_path):
 
 @pytest.mark.parametrize(
     ("option", "words"),
-    [("--move", "or give --yes in a script"), ("--by-hand", "is no terminal")],
+    [("--move", "or give --yes in a script"), ("--by-hand", "is not a terminal")],
 )
 def test_without_a_terminal_nobody_is_asked_and_nothing_moves(exoid, monkeypatch, option, words):
     monkeypatch.setattr("sys.stdin", io.StringIO("yes\n"))

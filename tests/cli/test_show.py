@@ -78,7 +78,7 @@ def test_a_verdict_is_shown_by_its_words_and_numbers(exoid, tmp_path):
 @pytest.mark.parametrize(
     ("text", "says"),
     [
-        ('{"contract": "verdict/1", "status"', "is no whole JSON document (line 1, column 35:"),
+        ('{"contract": "verdict/1", "status"', "is not a whole JSON document (line 1, column 35:"),
         ('{"contract": "verdict/1"}', "status: missing; add it"),
         (
             json.dumps(verdict_of(noise_floor_nm={"hip": 0.1, "knee": float("nan")})),

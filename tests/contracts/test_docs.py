@@ -44,7 +44,7 @@ def test_every_column_stands_in_its_tables_section(contract):
 
 ROWS = {
     verdict.Finding: r"findings\[\]\.",
-    verdict.Likely: r"findings\[\]\.causes",
+    verdict.LikelyCause: r"findings\[\]\.causes",
     verdict.Law: r"findings\[\]\.laws",
     verdict.Node: r"findings\[\]\.path",
     verdict.Shares: "router",

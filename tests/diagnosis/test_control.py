@@ -71,7 +71,7 @@ def test_a_leg_that_cannot_exist_is_not_simulated_and_the_reason_is_given(sprung
     assert loop["with"] is None
     assert loop["without"] is not None
     assert loop["reason"].startswith(
-        "with the causes: the with_human parameters are no real leg: X2 (X1 - X2) = "
+        "with the causes: the with_human parameters are not those of a real leg: X2 (X1 - X2) = "
     )
     assert loop["reason"].endswith("the mass matrix is not positive definite")
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from pipelines.contracts.joints import Joint
-from pipelines.contracts.verdict import Named
+from pipelines.contracts.verdict import EffectAtJoint
 from pipelines.diagnosis.candidates.candidate import proposals
 from pipelines.diagnosis.diagnose import diagnose
 from pipelines.diagnosis.evidence.baseline import Baseline
@@ -58,7 +58,7 @@ def test_a_spring_at_a_small_servo_is_named_or_tied_and_fitted_to_its_size():
     outcome = verdict(diagnosis)
     (cause,) = outcome["causes"]
     assert "parallel_spring@arm" in {
-        Named.model_validate(one).label for one in (cause, *cause["indistinguishable_from"])
+        EffectAtJoint.model_validate(one).label for one in (cause, *cause["indistinguishable_from"])
     }
     assert outcome["status"] == "explained"
     (spring,) = verdict(naming(diagnosis, "parallel_spring@arm"))["causes"]

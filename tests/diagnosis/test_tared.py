@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pipelines.contracts.verdict import Named
+from pipelines.contracts.verdict import EffectAtJoint
 from pipelines.diagnosis.diagnose import diagnose
 from pipelines.diagnosis.verdict.verdict import verdict
 from tests.diagnosis.sessions import banded, session
@@ -43,7 +43,9 @@ def test_a_sensor_tared_at_each_start_is_named_and_only_a_drift_that_hardly_grow
 ):
     assert tared["status"] == "explained"
     (cause,) = tared["causes"]
-    names = {Named.model_validate(one).label for one in (cause, *cause["indistinguishable_from"])}
+    names = {
+        EffectAtJoint.model_validate(one).label for one in (cause, *cause["indistinguishable_from"])
+    }
     assert "torque_offset@knee" in names and names <= {"torque_offset@knee", "torque_drift@knee"}
     assert "per-run torque offset at the knee" in tared["summary"]
     rates = [p for p in cause["parameters"] if p["name"] == "rate"]
@@ -84,7 +86,7 @@ def test_one_offset_in_all_runs_is_one_and_no_run_has_another():
 def test_what_grows_within_runs_is_a_drift_whatever_its_level(levels):
     outcome = verdict_of(levels, rate=0.03)
     (cause,) = outcome["causes"]
-    assert Named.model_validate(cause).label == "torque_drift@knee"
+    assert EffectAtJoint.model_validate(cause).label == "torque_drift@knee"
     assert "torque_offset" not in [tie["effect"] for tie in cause["indistinguishable_from"]]
     rate = next(p for p in cause["parameters"] if p["name"] == "rate")
     assert rate["ci95"][0] <= 0.03 <= rate["ci95"][1]

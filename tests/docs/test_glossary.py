@@ -121,3 +121,17 @@ def test_other_words_and_keys_of_files_are_not(source):
 
 def test_no_module_or_page_holds_a_word_to_avoid():
     assert {file: words for file, words in avoided_by_file() if words} == {}
+
+
+def test_no_class_is_named_by_a_participle_alone():
+    """``Exported`` says what happens to a thing, and not what it is; an error is an event."""
+    classes = {
+        node.name: {base.id for base in node.bases if isinstance(base, ast.Name)}
+        for root in ("pipelines", "exoid_cli")
+        for path in (ROOT / root).rglob("*.py")
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+        if isinstance(node, ast.ClassDef)
+    }
+    events = {"DeviceError", "KeyboardInterrupt"}
+    participles = {name for name in classes if re.fullmatch(r"_?[A-Z][a-z]+ed", name)}
+    assert {name for name in participles if not classes[name] & events} == set()

@@ -184,7 +184,7 @@ def test_friction_that_drives_is_warned_of_and_bodies_keep_its_sound_half(format
         replace(LEG[1], values=np.array([2.5, -0.4])),
         replace(LEG[2], values=np.array([-0.3, -0.1])),
     )
-    warned = made.driving()
+    warned = made.friction_warnings()
     assert [sentence.partition(" is negative")[0] for sentence in warned] == [
         "friction@hip: viscous = -0.4 N·m·s/rad",
         "friction@knee: coulomb = -0.3 N·m",

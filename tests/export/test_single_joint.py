@@ -185,7 +185,7 @@ def test_a_cause_that_such_a_machine_cannot_have_is_said_to_be_left_out():
 def test_a_body_of_negative_inertia_is_refused_as_no_machine_of_its_kind(kind):
     with pytest.raises(
         InputError,
-        match=r"are no real machine: X1 = -.* with the signs of torque and angle as they",
+        match=r"not those of a real machine: X1 = -.* with the signs of torque and angle as they",
     ):
         single(kind, times=-1.0)
 
@@ -205,6 +205,6 @@ def test_play_is_held_by_json_and_listed_by_what_has_no_element_for_it():
 )
 def test_a_body_without_mass_is_refused_in_a_line(kind, times):
     with pytest.raises(
-        InputError, match=r"exo_alone parameters are no real machine: .* identify again"
+        InputError, match=r"exo_alone parameters are not those of a real machine: .* identify again"
     ):
         single(kind, times=times)

@@ -536,10 +536,11 @@ def test_ctrl_c_leaves_no_half_recording(pendulum, write_csv, tmp_path):
     (tmp_path / "map.toml").write_text(MAP, encoding="utf-8")
     code = (
         "import os, signal; from pipelines.importing import recordings as r; from exoid_cli.app"
-        " import run; real = r.Imported.pieces\ndef pieces(self):\n  yield next(real(self));"
-        " os.kill(os.getpid(), signal.SIGINT); yield None\nr.Imported.pieces = pieces\nfolder ="
-        f" {str(tmp_path)!r}\nraise SystemExit(run(['import', {str(path)!r}, '--map', folder +"
-        " '/map.toml', '-o', folder + '/out']))"
+        " import run; of = r.ImportedRecording; real = of.pieces\ndef pieces(self):\n"
+        "  yield next(real(self)); os.kill(os.getpid(), signal.SIGINT); yield None\n"
+        f"of.pieces = pieces\nfolder = {str(tmp_path)!r}\n"
+        f"raise SystemExit(run(['import', {str(path)!r}, '--map', folder + '/map.toml',"
+        " '-o', folder + '/out']))"
     )
     stopped = subprocess.run(
         [sys.executable, "-c", code], capture_output=True, text=True, timeout=120

@@ -310,10 +310,10 @@ def test_parameters_of_no_real_leg_are_refused_with_the_reason(
     assert (code, err) == (
         2,
         (
-            "exoid: the with_human parameters are no real leg: X2 (X1 - X2) = 1.241 is not above"
-            " (L1 X3)² = 2.428 kg²·m⁴: the mass matrix is not positive definite. Its simulation"
-            " diverges; identify again from motions that separate X1, X2 and X3 better, or"
-            " choose another --run"
+            "exoid: the with_human parameters are not those of a real leg: X2 (X1 - X2) = 1.241 is"
+            " not above (L1 X3)² = 2.428 kg²·m⁴: the mass matrix is not positive definite. Its"
+            " simulation diverges; identify again from motions that separate X1, X2 and X3 better,"
+            " or choose another --run"
         ),
     )
     assert not (tmp_path / "out").exists()

@@ -90,7 +90,7 @@ def test_another_set_of_inputs_is_named(chain):
     step.target.write_text(json.dumps({"provenance": describe([chain.source])}))
     assert chain.states()["two"] == (
         "stale",
-        ("first.json was not among its inputs", "source.json is no input any more"),
+        ("first.json was not among its inputs", "source.json is no longer an input"),
     )
 
 

@@ -13,7 +13,7 @@ from pipelines.settings.rig.block import ReadBlock, registers_of
 
 
 @dataclass(frozen=True)
-class Moved:
+class MovedBlock:
     """A block with some of its registers at other addresses."""
 
     by: int
@@ -22,7 +22,7 @@ class Moved:
     reader: BlockReader
 
 
-def moved_blocks(probe: Probe, misread: Collection[str]) -> Iterator[Moved]:
+def moved_blocks(probe: Probe, misread: Collection[str]) -> Iterator[MovedBlock]:
     """Yield a device's block with other addresses, the likeliest first.
 
     Parameters
@@ -40,7 +40,7 @@ def moved_blocks(probe: Probe, misread: Collection[str]) -> Iterator[Moved]:
             yield from _moved(probe, settings, by, some)
 
 
-def in_words(probe: Probe, moved: Moved) -> str:
+def in_words(probe: Probe, moved: MovedBlock) -> str:
     """Return which addresses of the rig file are wrong, and how to correct them."""
     where = f"{probe.map_path}.read"
     everything = len(moved.names) == len(probe.block.names)
@@ -59,7 +59,7 @@ def in_words(probe: Probe, moved: Moved) -> str:
     )
 
 
-async def read_moved(moved: Moved, seconds: float) -> Series | None:
+async def read_moved(moved: MovedBlock, seconds: float) -> Series | None:
     """Read a moved block for a while; None where the device refuses it."""
     try:
         return await Series.read(moved.reader, seconds)
@@ -76,7 +76,9 @@ def _distances(probe: Probe) -> list[int]:
     return [-kind - 1, -kind, 1, -1]
 
 
-def _moved(probe: Probe, settings: ReadBlock, by: int, names: tuple[str, ...]) -> Iterator[Moved]:
+def _moved(
+    probe: Probe, settings: ReadBlock, by: int, names: tuple[str, ...]
+) -> Iterator[MovedBlock]:
     changed = {
         name: {**register.model_dump(), "address": register.address + by}
         for name, register in registers_of(settings).items()
@@ -89,4 +91,4 @@ def _moved(probe: Probe, settings: ReadBlock, by: int, names: tuple[str, ...]) -
         return
     taken = [address for one in registers_of(read).values() for address in one.addresses]
     if len(set(taken)) == len(taken):
-        yield Moved(by, names, BlockReader(probe.part.device, read))
+        yield MovedBlock(by, names, BlockReader(probe.part.device, read))

@@ -187,7 +187,7 @@ class AlignedSampling:
         return list(self._complete_rows(samples))
 
     def end(self) -> None:
-        """Cancel all requests to the drives besides those of the cycle."""
+        """Cancel all requests to the drives but those of the cycle."""
         for source in self._sources:
             source.pending.end()
 

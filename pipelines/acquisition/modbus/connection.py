@@ -58,7 +58,7 @@ def tls_context(settings: TlsLine) -> ssl.SSLContext:
     Raises
     ------
     SettingsError
-        A file is no certificate or key that can be used.
+        A file is not a usable certificate or key.
     """
     file: Path | None = settings.ca
     try:
@@ -70,7 +70,7 @@ def tls_context(settings: TlsLine) -> ssl.SSLContext:
             )
     except OSError as error:  # SSLError is one
         raise SettingsError(
-            f"{file}: is no certificate that can be used ({error.strerror or error})"
+            f"{file}: is not a usable certificate ({error.strerror or error})"
         ) from error
     return context
 

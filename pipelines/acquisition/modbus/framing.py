@@ -6,7 +6,7 @@ from pymodbus.framer import FramerRTU, FramerSocket
 from pymodbus.framer.base import FramerBase
 from pymodbus.pdu import DecodePDU, ModbusPDU
 
-from pipelines.acquisition.modbus.unexpected import Asked
+from pipelines.acquisition.modbus.unexpected import SentRequest
 from pipelines.modbus.functions import WRITE_SINGLE
 
 Trace = Callable[[bool, bytes], None]
@@ -19,7 +19,7 @@ class Traffic:
     """The request under way on a line, and all bytes that came since."""
 
     def __init__(self) -> None:
-        self.asked = Asked(b"", 0, 0, 0, False)
+        self.asked = SentRequest(b"", 0, 0, 0, False)
         self.came = b""
         self.echoes: bool | None = None
         """Whether the adapter sends back what it is sent; None until an answer shows it."""
@@ -27,7 +27,7 @@ class Traffic:
         self._pending = 0
         """Bytes that were shown before, but not used up."""
 
-    def ask(self, asked: Asked) -> None:
+    def ask(self, asked: SentRequest) -> None:
         """Begin with a request."""
         self.asked, self.came, self._pending = asked, b"", 0
         self.trace(True, asked.frame)
@@ -59,7 +59,7 @@ class ListeningFramer(FramerBase):
         frame = super().buildFrame(message)
         transaction = 0 if self.in_rtu else message.transaction_id
         self.traffic.ask(
-            Asked(frame, message.dev_id, transaction, message.function_code, self.in_rtu)
+            SentRequest(frame, message.dev_id, transaction, message.function_code, self.in_rtu)
         )
         return frame
 

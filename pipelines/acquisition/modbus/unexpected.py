@@ -14,7 +14,7 @@ MBAP = 7
 
 
 @dataclass(frozen=True)
-class Asked:
+class SentRequest:
     """A request, as it was sent."""
 
     frame: bytes
@@ -26,12 +26,12 @@ class Asked:
     """Whether it was sent in an RTU frame."""
 
 
-def described(asked: Asked, came: bytes) -> str | None:
+def described(asked: SentRequest, came: bytes) -> str | None:
     """Return in words what came in place of an answer, with a remedy; None for nothing.
 
     Parameters
     ----------
-    asked : Asked
+    asked : SentRequest
         The request.
     came : bytes
         All bytes since then; none of them was taken for its answer.
@@ -64,7 +64,7 @@ def as_hex(data: bytes, most: int = 16) -> str:
     return f"{shown} ..." if len(data) > most else shown
 
 
-def _as_frames(asked: Asked, came: bytes) -> str | None:
+def _as_frames(asked: SentRequest, came: bytes) -> str | None:
     """Describe bytes that are a whole Modbus frame of either kind."""
     in_tcp = _tcp_frame(came)
     if in_tcp is not None:
@@ -88,14 +88,14 @@ def _as_frames(asked: Asked, came: bytes) -> str | None:
     return None
 
 
-def _under_other_unit(asked: Asked, unit: int, came: bytes) -> str:
+def _under_other_unit(asked: SentRequest, unit: int, came: bytes) -> str:
     return (
         f"answered under unit {unit}, asked unit {asked.unit} ({as_hex(came)}); correct unit in"
         " the rig file, or in the device"
     )
 
 
-def _of_other_transaction(asked: Asked, transaction: int, came: bytes) -> str | None:
+def _of_other_transaction(asked: SentRequest, transaction: int, came: bytes) -> str | None:
     if transaction == asked.transaction:
         return None
     sent = asked.transaction.to_bytes(2, "big")
@@ -118,7 +118,7 @@ def _as_text(came: bytes) -> str | None:
     return f"answered with text ({text!r}), expected Modbus; correct host and port"
 
 
-def _as_bytes(asked: Asked, came: bytes) -> str:
+def _as_bytes(asked: SentRequest, came: bytes) -> str:
     if _is_begun(asked, came):
         return (
             f"sent only the first {len(came)} bytes of an answer ({as_hex(came)}); check the"
@@ -130,7 +130,7 @@ def _as_bytes(asked: Asked, came: bytes) -> str:
     return f"sent {len(came)} bytes that are no frame ({as_hex(came)}); {remedy}"
 
 
-def _is_begun(asked: Asked, came: bytes) -> bool:
+def _is_begun(asked: SentRequest, came: bytes) -> bool:
     """Return whether bytes are the beginning of an answer."""
     head = bytes([asked.unit, asked.function])
     if not asked.in_rtu:

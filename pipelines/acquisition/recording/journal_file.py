@@ -126,7 +126,7 @@ def _why_no_journal(path: Path) -> str:
     )
 
 
-class _Bounded:
+class _BoundedFile:
     """A file that never reads beyond its end, even if damaged bytes make Arrow ask for that."""
 
     closed = False
@@ -142,7 +142,7 @@ class _Bounded:
 def _part_at(file: BinaryIO, place: int) -> bytes:
     """Return the part of a stream at a place of the file, and leave the file at its end."""
     file.seek(place)
-    pa.ipc.read_message(pa.PythonFile(_Bounded(file), mode="r"))
+    pa.ipc.read_message(pa.PythonFile(_BoundedFile(file), mode="r"))
     return _between(file, place, file.tell())
 
 

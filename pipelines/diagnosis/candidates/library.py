@@ -238,7 +238,7 @@ def _shapes(
         return []
     swings = fits[0].candidate.effect.swings
     best, slopes = best_transmission(fits, alone) if swings else alone.refined(fits[0])
-    # Shapes of a cause besides its best one.
+    # Shapes of a cause in addition to its best one.
     alternatives = 2
     # A refinement may end far from its start, and it is unknown which start of a transmission led
     # to the best shape.

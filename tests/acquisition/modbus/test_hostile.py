@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from pipelines.acquisition.modbus.device import Device
 from pipelines.acquisition.modbus.line import Line
 from pipelines.acquisition.modbus.one_client import greet
-from pipelines.acquisition.modbus.unexpected import Asked, described
+from pipelines.acquisition.modbus.unexpected import SentRequest, described
 from pipelines.errors import DeviceError, Unanswered
 from pipelines.modbus.register_block import Block
 from pipelines.settings.rig import Register
@@ -72,7 +72,7 @@ def test_every_unit_is_reached_on_tcp_by_either_function(unit, function):
 
 def test_a_reply_of_any_other_unit_is_no_answer_of_unit_0():
     # pymodbus itself takes every unit for 0.
-    asked = Asked(in_tcp(1, 0, b"\x03\x00\x07\x00\x01"), 0, 1, 3, False)
+    asked = SentRequest(in_tcp(1, 0, b"\x03\x00\x07\x00\x01"), 0, 1, 3, False)
     assert "answered under unit 9, asked unit 0" in described(asked, in_tcp(1, 9, b"\x03\x02\0\7"))
 
 
@@ -207,7 +207,7 @@ REQUEST = b"\x03\x00\x07\x00\x01"
 @given(st.binary(max_size=40), st.booleans())
 def test_any_bytes_are_described_in_one_line(came, rtu):
     frame = in_rtu(1, REQUEST) if rtu else in_tcp(1, 1, REQUEST)
-    text = described(Asked(frame, 1, 0 if rtu else 1, 3, rtu), came)
+    text = described(SentRequest(frame, 1, 0 if rtu else 1, 3, rtu), came)
     assert (text is None) == (not came)
     assert text is None or "\n" not in text
 
@@ -215,9 +215,9 @@ def test_any_bytes_are_described_in_one_line(came, rtu):
 @given(st.integers(0, 255), st.binary(min_size=2, max_size=20))
 def test_an_answer_in_the_other_kind_of_frame_is_always_named_as_one(unit, content):
     pdu = bytes([3, len(content)]) + content
-    on_tcp = Asked(in_tcp(1, unit, REQUEST), unit, 1, 3, False)
+    on_tcp = SentRequest(in_tcp(1, unit, REQUEST), unit, 1, 3, False)
     assert 'set transport = "rtu_over_tcp"' in described(on_tcp, in_rtu(unit, pdu)) or (
         in_rtu(unit, pdu)[2:4] == b"\0\0"  # a content that begins like a TCP frame
     )
-    on_rtu = Asked(in_rtu(unit, REQUEST), unit, 0, 3, True)
+    on_rtu = SentRequest(in_rtu(unit, REQUEST), unit, 0, 3, True)
     assert 'set transport = "tcp"' in described(on_rtu, in_tcp(1, unit, pdu))

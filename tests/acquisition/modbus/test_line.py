@@ -426,7 +426,7 @@ def test_a_port_without_tls_is_reported(serve, on_line, line_of):
 def test_a_certificate_that_is_none_is_refused(on_line, tmp_path):
     (tmp_path / "ca.pem").write_text("nonsense")
     why = connecting(on_line("transport = 'tls'\nca = 'ca.pem'\n"))
-    assert why.startswith(f"{tmp_path}/ca.pem: is no certificate that can be used")
+    assert why.startswith(f"{tmp_path}/ca.pem: is not a usable certificate")
 
 
 def test_a_key_with_a_passphrase_is_refused_and_nobody_is_asked_for_it(

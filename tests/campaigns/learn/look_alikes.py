@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import minimize
 
-from pipelines.contracts.verdict import Named
+from pipelines.contracts.verdict import EffectAtJoint
 from pipelines.diagnosis.criteria import CRITERIA
 from pipelines.diagnosis.selection.unlisted_look_alikes import kept_share
 from pipelines.model import effect_named
@@ -21,7 +21,7 @@ PENALTY = 0.01
 """Weight of squared criteria; keeps them finite where all causes are right or all wrong."""
 
 
-class Judged(NamedTuple):
+class JudgedCause(NamedTuple):
     """A cause that was asked whether it is a look-alike."""
 
     probability: float
@@ -33,7 +33,7 @@ class Judged(NamedTuple):
     is_right: bool
 
 
-def judged_causes(root: Path) -> Iterator[Judged]:
+def judged_causes(root: Path) -> Iterator[JudgedCause]:
     """Yield the causes that an examination's answers, in a folder, asked about."""
     for path in sorted((root / "truth").glob("*.json")):
         answer = root / "answers" / path.stem / "answer.json"
@@ -45,10 +45,10 @@ def judged_causes(root: Path) -> Iterator[Judged]:
             yield from _judged(truth, verdict)
 
 
-def _judged(truth: dict[str, Any], verdict: dict[str, Any]) -> Iterator[Judged]:
+def _judged(truth: dict[str, Any], verdict: dict[str, Any]) -> Iterator[JudgedCause]:
     there = {(name, h["joint"]) for h in truth["hidden"] for name in (h["effect"], *h["kin"])}
     named, posterior = (
-        {Named.model_validate(cause).label: cause for cause in verdict["causes"]},
+        {EffectAtJoint.model_validate(cause).label: cause for cause in verdict["causes"]},
         verdict["posterior"],
     )
     for label, removed in posterior["systematic_error_removed"].items():
@@ -60,7 +60,7 @@ def _judged(truth: dict[str, Any], verdict: dict[str, Any]) -> Iterator[Judged]:
         places = {(str(effect_named(name).family), at) for name, at in names_of(cause)}
         look_alikes, smooth_laws = _probabilities(posterior["laws"], places)
         before = min(cause["probability"] + look_alikes, 1.0)
-        yield Judged(before, removed, smooth_laws / before, bool(there & names_of(cause)))
+        yield JudgedCause(before, removed, smooth_laws / before, bool(there & names_of(cause)))
 
 
 def _probabilities(
@@ -78,7 +78,7 @@ def _probabilities(
     return look_alikes, smooth_laws
 
 
-def learn_look_alike(judged: Sequence[Judged]) -> dict[str, Any]:
+def learn_look_alike(judged: Sequence[JudgedCause]) -> dict[str, Any]:
     """Return the criteria that give the truth of judged causes most probability, and what they are
     worth."""
     p, removed, ratio, right = (np.array(column) for column in zip(*judged, strict=True))

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.special import expit
 
-from tests.campaigns.learn.look_alikes import Judged, learn_look_alike
+from tests.campaigns.learn.look_alikes import JudgedCause, learn_look_alike
 
 
 def drawn(count, certain, slope, seed=3):
@@ -13,7 +13,7 @@ def drawn(count, certain, slope, seed=3):
     probability = rng.uniform(0.5, 1.0, count)
     is_right = rng.random(count) < probability * expit(certain + slope * np.log(removed))
     columns = probability.tolist(), removed.tolist(), [0.0] * count, is_right.tolist()
-    return [Judged(*one) for one in zip(*columns, strict=True)]
+    return [JudgedCause(*one) for one in zip(*columns, strict=True)]
 
 
 def test_the_criteria_that_causes_were_drawn_by_are_recovered_and_calibrated():
@@ -24,5 +24,5 @@ def test_the_criteria_that_causes_were_drawn_by_are_recovered_and_calibrated():
 
 
 def test_causes_that_are_all_right_give_finite_criteria():
-    learned = learn_look_alike([Judged(0.99, 0.9, 0.0, True)] * 20)
+    learned = learn_look_alike([JudgedCause(0.99, 0.9, 0.0, True)] * 20)
     assert np.isfinite(learned["look_alike"]).all()

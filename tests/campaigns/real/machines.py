@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from exoid_cli.app import run
 from pipelines.contracts import PARAMETERS, RESIDUALS
-from pipelines.contracts.verdict import Named
+from pipelines.contracts.verdict import EffectAtJoint
 from pipelines.dynamics.replay import replay
 from pipelines.effects.rotor_inertia import RotorInertia
 from pipelines.mechanics.geometry import Geometry
@@ -111,7 +111,7 @@ class Diagnosed:
     def model_of(self, motion: Motion) -> Model:
         """Return the extended model with what a run has for itself."""
         own = {
-            Named.model_validate(cause).label: {
+            EffectAtJoint.model_validate(cause).label: {
                 name: value for name, value in one["values"].items() if value is not None
             }
             for cause in self.verdict["causes"]
@@ -170,7 +170,7 @@ class Diagnosed:
         """
         of_runs = {motion.file: self.model_of(motion) for motion in self.motions}
         own = {
-            Named.model_validate(cause).label
+            EffectAtJoint.model_validate(cause).label
             for cause in self.verdict["causes"]
             if cause["each_run"]
         }

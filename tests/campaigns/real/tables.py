@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pipelines.contracts.verdict import Cause, Named
+from pipelines.contracts.verdict import Cause, EffectAtJoint
 from pipelines.mechanics.motion import Motion
 from pipelines.wording.label import effect_of_cause
 from tests.campaigns.real.machines import LOGS, Diagnosed, of_purpose, symmetric, with_rotor
@@ -153,7 +153,7 @@ def sizes(d: Diagnosed, of: str) -> str:
     """Return the parameters of the ``known`` effects or the named ``causes``."""
     rows = [
         (
-            Named.model_validate(one).label,
+            EffectAtJoint.model_validate(one).label,
             p["name"],
             _sized(p, ".3g"),
             " … ".join(f"{end:.3g}" for end in p["ci95"]),
@@ -207,7 +207,7 @@ def of_each_run(d: Diagnosed) -> str:
     """Return each run's own values of the named causes."""
     own = [cause for cause in d.verdict["causes"] if cause["each_run"]]
     headings = [
-        f"{name} of {Named.model_validate(cause).label}, {unit}"
+        f"{name} of {EffectAtJoint.model_validate(cause).label}, {unit}"
         for cause in own
         for name in cause["each_run"][0]["values"]
         for unit in [p["unit"] for p in cause["parameters"] if p["name"] == name]

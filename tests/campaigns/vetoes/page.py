@@ -14,7 +14,7 @@ INTRODUCTION = """# How often acquisition is blamed
 For everyone whose diagnosis was stopped by a fault of acquisition, or fears a fault that nobody
 names. Written by `make vetoes`. Sessions of all worlds of the [blind examination](blind.md) and the
 [real recordings](real-data.md) are examined as they are, and with faults put into them. Most
-sessions hide missing physics besides. Brackets hold Wilson's 95 % interval of a share.
+sessions hide missing physics as well. Brackets hold Wilson's 95 % interval of a share.
 
 A fault's *share* is the part of the error that it makes, for the model fitted to the sound runs.
 The angle of one joint alone does not show uneven instants: these are put into two joints only.
