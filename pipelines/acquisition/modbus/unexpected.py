@@ -48,7 +48,7 @@ def described(asked: SentRequest, came: bytes) -> str | None:
     return _as_frames(asked, rest) or _as_text(rest) or _as_bytes(asked, rest)
 
 
-def answering_unit(asked: Asked, came: bytes) -> int | None:
+def answering_unit(asked: SentRequest, came: bytes) -> int | None:
     """Return the unit in the frame that came in place of an answer; None if there is none."""
     if asked.in_rtu:
         units = [*_rtu_units(came.removeprefix(asked.frame))]
