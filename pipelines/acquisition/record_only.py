@@ -197,14 +197,22 @@ class _Recorder:
                         self._torn_rows = torn.torn
             now = time.monotonic()
             if now - answered_at > self._watchdog_s:
-                why = fault or "the machine's counter stands still; check the machine"
-                raise DeviceError(
-                    f"no new sample of all devices for {self._watchdog_s:g} s"
-                    f" (safety.watchdog_s): {why}"
-                )
+                raise self._expired(now - answered_at, fault, machine)
             if now - reported_at >= 1.0:
                 reported_at = now
                 self._report((number + 1) / self._rate_hz, journal.rows)
+
+    def _expired(
+        self, waited_s: float, fault: DeviceError | None, machine: ReadOnlyMachine
+    ) -> DeviceError:
+        """Return the watchdog's error, with the last fault if there was one."""
+        allowed = f"for {waited_s:.3g} s, allowed are {self._watchdog_s:g} s (safety.watchdog_s)"
+        if fault is not None:
+            return DeviceError(f"watchdog: no whole row {allowed}: {fault}")
+        return DeviceError(
+            f"watchdog: no new sample from {machine.parts[0].device.label} {allowed}: its counter"
+            " stands still; check that the machine runs"
+        )
 
     def _reading(self, machine: ReadOnlyMachine) -> dict[str, Any]:
         """Return how rows were timed, for the recording's metadata."""

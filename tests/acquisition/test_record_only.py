@@ -226,8 +226,22 @@ def test_a_fault_of_one_answer_costs_one_row_and_never_a_wrong_one(
 
 
 def test_a_recording_that_ends_early_names_the_fault_that_ended_it(record_bench):
-    with pytest.raises(DeviceError, match=r"0\.3 s \(safety\.watchdog_s\): .*it is busy"):
+    expected = (
+        r"^watchdog: no whole row for 0\.\d+ s, allowed are 0\.3 s \(safety\.watchdog_s\):"
+        r" drive elbow \(127\.0\.0\.1:\d+, unit 1\): .*it is busy"
+    )
+    with pytest.raises(DeviceError, match=expected):
         record_bench(lambda n, words: 6 if n > 30 else words, watchdog_s=0.3)
+
+
+def test_a_counter_that_stands_still_ends_a_recording_and_names_its_device(record_bench):
+    expected = (
+        r"^watchdog: no new sample from drive elbow \(127\.0\.0\.1:\d+, unit 1\) for 0\.\d+ s,"
+        r" allowed are 0\.3 s \(safety\.watchdog_s\): its counter stands still; check that the"
+        " machine runs"
+    )
+    with pytest.raises(DeviceError, match=expected):
+        record_bench(lambda n, words: [7, 500, 20], watchdog_s=0.3)
 
 
 def test_a_counter_of_another_rate_is_refused_rather_than_recorded(record_bench):

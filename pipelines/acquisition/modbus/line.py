@@ -1,6 +1,7 @@
 """A line to devices: one connection, with one request at a time and pauses in between."""
 
 import asyncio
+import ssl
 import sys
 from collections.abc import AsyncIterator, Awaitable, Callable
 from contextlib import asynccontextmanager, suppress
@@ -55,6 +56,9 @@ class Line:
         self.client = client_of(settings, self._tls, timeout_s, self._note_connection)
         # Else pymodbus closes the connection after some missing replies; the watchdog decides that.
         self.client.set_max_no_responses(sys.maxsize)
+        self._ended_by: Exception | None = None
+        """Error with which the system ended the connection; None where the other end closed it."""
+        self._note_why_it_ends()
         self.traffic = Traffic()
         check_replies(self.client, not settings.has_transaction_ids, self.traffic, self._note_reply)
         self.devices: list[str] = []
@@ -268,6 +272,16 @@ class Line:
             loop = asyncio.get_running_loop()
             await asyncio.sleep(max(0.0, self._quiet_since + self.settings.quiet_s - loop.time()))
 
+    def _note_why_it_ends(self) -> None:
+        """Keep the reason why a connection ends, which pymodbus does not hand on."""
+        hand_on = self.client.ctx.callback_disconnected
+
+        def note(error: Exception | None) -> None:
+            self._ended_by = error
+            hand_on(error)
+
+        self.client.ctx.callback_disconnected = note  # type: ignore[assignment, method-assign]
+
     def _note_connection(self, connected: bool) -> None:
         """End the request that is under way when the connection ends: no reply will come."""
         if not connected and not self._asking and self._answers == 1 and self._closes is None:
@@ -285,8 +299,17 @@ class Line:
                 f"the other end closed the line before its first answer{others}; it does not trust"
                 " the certificate and key in the rig file, or has stopped"
             )
-        if self.has_answered or isinstance(self.settings, RtuLine):
+        if isinstance(self.settings, RtuLine):
             return f"the line is lost{others}; check cable and power"
+        if self.has_answered:
+            error = self._ended_by
+            # A reset comes from the other end, too, which no longer knows the connection.
+            if error is None or isinstance(error, ConnectionError | ssl.SSLError):
+                return (
+                    f"the line is lost{others}: the device closed the connection; end other"
+                    " programs that use it, or see whether it restarted or limits idle time"
+                )
+            return f"the line is lost{others} ({error}); check cable and power"
         came = self.traffic.came
         after = f"after {len(came)} bytes ({as_hex(came)})" if came else "without an answer"
         return (

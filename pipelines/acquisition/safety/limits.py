@@ -107,8 +107,8 @@ class Limits:
             if silent_s > self._rig.safety.watchdog_s + sensor.every / self._rate:
                 return (
                     f"watchdog: no new sample from {self._rig.label_of(sensor)} for {silent_s:.3f}"
-                    f" s, allowed are {self._rig.safety.watchdog_s:g} s; its counter stands still,"
-                    " or what it sends is no number"
+                    f" s, allowed are {self._rig.safety.watchdog_s:g} s (safety.watchdog_s): its"
+                    " counter stands still or its forces are no numbers; check its power and cable"
                 )
         return None
 

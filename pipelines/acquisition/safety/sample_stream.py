@@ -64,8 +64,9 @@ class SampleStream:
             raise self._unanswered
         raise DeviceError(
             f"watchdog: no new sample from {self._label} for {self._watchdog.waited(now):.3f} s,"
-            f" allowed are {self._watchdog.longest_s:g} s; its counter stands still, its answers"
-            " are lost, or this computer is too busy"
+            f" allowed are {self._watchdog.longest_s:g} s (safety.watchdog_s): its counter stands"
+            " still or its answers are late; check the drive and its line, and end other programs"
+            " on this computer"
         )
 
     def refuse_to_fall_behind(self, newest: int) -> None:

@@ -1,6 +1,7 @@
 """A Modbus TCP server with the manners of devices as they are sold, for tests of lines."""
 
 import asyncio
+import socket
 import struct
 from contextlib import asynccontextmanager
 
@@ -52,11 +53,24 @@ class Server:
     """Serves ``manner`` over TCP frames, or RTU frames with or without an echo.
 
     ``clients`` is how many connections are served at once: of more, the others are not answered;
-    with ``newest`` the earlier ones are closed.
+    with ``newest`` the earlier ones are closed. A connection ends after ``answers``, with ``reset``
+    without notice.
     """
 
-    def __init__(self, manner="ok", *, rtu=None, closes=False, clients=99, newest=False, slow=0.0):
-        self.manner, self.rtu, self.closes, self.slow = manner, rtu, closes, slow
+    def __init__(
+        self,
+        manner="ok",
+        *,
+        rtu=None,
+        closes=False,
+        clients=99,
+        newest=False,
+        slow=0.0,
+        answers=None,
+        reset=False,
+    ):
+        self.manner, self.rtu, self.slow = manner, rtu, slow
+        self.answers, self.reset = 1 if closes else answers, reset
         self.clients, self.newest = clients, newest
         self.open, self.connections, self.requests = [], 0, []
 
@@ -68,18 +82,25 @@ class Server:
             self.open.clear()
         self.open.append(writer)
         is_served = len(self.open) <= self.clients
+        answered = 0
         try:
-            while True:
+            while answered != self.answers:
                 reply = await (self._rtu(reader) if self.rtu else self._tcp(reader))
                 if is_served:
                     await self._send(writer, reply)
-                if self.closes:
-                    break
+                answered += 1
         except (asyncio.IncompleteReadError, ConnectionError, asyncio.CancelledError):
             pass
         finally:
             if writer in self.open:
                 self.open.remove(writer)
+            if self.reset:
+                await asyncio.sleep(0.02)  # the last answer arrives first
+                linger = struct.pack("ii", 1, 0)
+                writer.get_extra_info("socket").setsockopt(
+                    socket.SOL_SOCKET, socket.SO_LINGER, linger
+                )
+                writer.transport.abort()
             writer.close()
 
     async def _send(self, writer, reply):

@@ -1,6 +1,7 @@
 """Devices as they are sold: what they do that is harmless is served, the rest is named."""
 
 import asyncio
+import errno
 import re
 
 import pytest
@@ -114,17 +115,29 @@ def test_a_server_that_closes_after_each_answer_is_served_and_named(seconds):
     assert "closes its connection after each answer" in line.peculiarities[0]
 
 
-def test_a_connection_that_ends_after_several_answers_is_a_lost_line():
-    async def ask(device):
-        await device.read(0, 1)
-        await device.read(0, 1)
-        device.line.client.ctx.transport.abort()
-        await asyncio.sleep(0.02)
-        await device.read(0, 1)
+async def ask_three_times(device, before_the_third=lambda transport: None):
+    await device.read(0, 1)
+    await device.read(0, 1)
+    before_the_third(device.line.client.ctx.transport)
+    await asyncio.sleep(0.02)
+    await device.read(0, 1)
 
-    with pytest.raises(DeviceError, match="the line is lost") as caught:
-        asked_of(ask)
+
+@pytest.mark.parametrize("reset", [False, True])
+def test_a_device_that_closes_the_connection_after_several_answers_is_named_as_that(reset):
+    expected = "the line is lost: the device closed the connection; end other programs that use it"
+    with pytest.raises(DeviceError, match=expected) as caught:
+        asked_of(ask_three_times, answers=2, reset=reset)
     assert not isinstance(caught.value, Unanswered)
+
+
+def test_a_connection_that_the_system_gives_up_sends_the_user_to_cable_and_power():
+    def give_up(transport):
+        # As the system does where a cable is pulled and nothing comes back for long.
+        transport._fatal_error(TimeoutError(errno.ETIMEDOUT, "Connection timed out"))
+
+    with pytest.raises(DeviceError, match=r"lost \(.*timed out\); check cable and power"):
+        asked_of(lambda device: ask_three_times(device, give_up))
 
 
 @pytest.mark.parametrize("newest", [False, True])

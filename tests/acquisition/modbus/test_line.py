@@ -247,9 +247,15 @@ def test_a_lost_line_is_one_error_that_names_it_and_all_who_are_on_it(
         "drive hip (unit 1), drive knee (unit 2), sensor thigh_front (unit 11), sensor thigh_back"
         " (unit 12), "
     )
+    why = "; check cable and power"
+    if transport != "rtu":
+        why = (
+            ": the device closed the connection; end other programs that use it, or see whether it"
+            " restarted or limits idle time"
+        )
     assert messages == {
         f"line leg ({place}): the line is lost, and with it {devices}sensor shank_front (unit 13),"
-        " sensor shank_back (unit 14); check cable and power"
+        f" sensor shank_back (unit 14){why}"
     }
     assert waited < 10.0  # it is not waited for an answer that cannot come
 
