@@ -4,6 +4,7 @@ import asyncio
 import contextlib
 import itertools
 import json
+import re
 import socket
 import struct
 import threading
@@ -116,17 +117,20 @@ def test_a_machine_that_falls_silent_leaves_an_aborted_recording(record_only_on,
     assert len(aborted.frame) > 5
 
 
-def a_device(answer, most_answers=10**9):
+def a_device(answer, most_answers=10**9, answers_as=lambda unit: unit):
     """Serve counter (100 a second), angle and torque; `answer(n, words)` may give other words.
 
     It gives an exception code instead, or None for no answer. A connection ends after
-    `most_answers`. Returns the server's socket, and the set of functions that were asked for.
+    `most_answers`. `answers_as(unit)` gives the unit that a reply names, or 0 for exception 11,
+    "gateway got no answer", or None for no answer. Returns the server's socket, and the set of
+    functions that were asked for.
     """
     asked, began = set(), time.monotonic()
     numbers = itertools.count()
 
     def serve(link):
-        with link, contextlib.suppress(OSError):
+        # A frame of another kind has too few bytes.
+        with link, contextlib.suppress(OSError, struct.error, IndexError):
             for _ in range(most_answers):
                 head = link.recv(7, socket.MSG_WAITALL)
                 if len(head) < 7:
@@ -135,8 +139,9 @@ def a_device(answer, most_answers=10**9):
                 asked.add(content[0])
                 first, count = struct.unpack(">HH", content[1:5])
                 now = round(100.0 * (time.monotonic() - began))
-                words = answer(next(numbers), [now, 500, 20])
-                if words is None:
+                unit = answers_as(head[6])
+                words = 11 if unit == 0 else answer(next(numbers), [now, 500, 20])
+                if words is None or unit is None:
                     continue
                 reply = (
                     bytes([content[0] | 0x80, words])
@@ -145,7 +150,8 @@ def a_device(answer, most_answers=10**9):
                         f">BB{count}H", content[0], 2 * count, *words[first : first + count]
                     )
                 )
-                link.sendall(head[:4] + struct.pack(">HB", len(reply) + 1, head[6]) + reply)
+                named = struct.pack(">HB", len(reply) + 1, unit or head[6])
+                link.sendall(head[:4] + named + reply)
 
     def accept():
         with contextlib.suppress(OSError):
@@ -425,3 +431,41 @@ def test_a_device_behind_a_lost_connection_is_not_taken_for_another_unit(tmp_pat
 
     with server:
         assert asyncio.run(run()) is None
+
+
+JOINT = '[[drive]]\njoint = "{}"\nport = {{port}}\nunit = {}\nmap = "plc"\n'
+ONLY_UNIT = (
+    "does not answer as unit {}, only unit 1 does, which is drive hip's; check its cable, its power"
+    " and the gateway's units. If one controller serves both, set unit = 1 and a map of its own"
+)
+OTHER_UNIT = (
+    "asked as unit {}, an answer came from unit 1, which is drive hip's; let the gateway pass on"
+    " all units. If one controller serves both, set unit = 1 and a map of its own"
+)
+
+
+@pytest.mark.parametrize(
+    ("answers_as", "expected"),
+    [
+        (lambda unit: 1 if unit == 1 else None, ONLY_UNIT),
+        (lambda unit: 1 if unit == 1 else 0, ONLY_UNIT),
+        (lambda unit: 1, OTHER_UNIT),
+    ],
+    ids=["silent for others", "with exceptions for others", "in the name of unit 1"],
+)
+@pytest.mark.parametrize("units", [(1, 2), (2, 3)], ids=str)
+def test_a_gateway_that_answers_as_unit_1_alone_is_never_advised_for_two_devices(
+    tmp_path, answers_as, expected, units
+):
+    server, _ = a_device(lambda n, words: words, answers_as=answers_as)
+    path = tmp_path / "bench.toml"
+    joints = JOINT.format("hip", units[0]) + JOINT.format("knee", units[1])
+    text = re.sub(r"\[\[drive\]\].*?map = \"plc\"\n", joints, BENCH, count=1, flags=re.DOTALL)
+    path.write_text(text.format(port=server.getsockname()[1], watchdog_s=1.0))
+    with server:
+        report = check_rig(path, 100.0)
+    of_knee = [one.text for one in report.findings if one.device == "drive knee"]
+    assert of_knee == [expected.format(units[1])]
+    of_hip = [one.text for one in report.findings if one.device == "drive hip"]
+    assert len(of_hip) == (units[0] != 1)
+    assert all("correct unit" in text for text in of_hip)

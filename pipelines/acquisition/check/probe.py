@@ -137,6 +137,8 @@ class Probe:
         self.map_path = f"map.{kind}.{part.settings.map}"
         self.every = part.settings.every if isinstance(part, Sensor) else 1
         """Cycles of a run from one reading to the next."""
+        self.answers_as: int | None = None
+        """Unit under which it seems to be, if another than the rig file's."""
         self._answers: list[Answer] = []
         self._last = [0] * self.block.count
 

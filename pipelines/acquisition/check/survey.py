@@ -5,9 +5,13 @@ from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
-from pymodbus.constants import ExcCodes
 
-from pipelines.acquisition.check.absent import explain_absence, explain_identity
+from pipelines.acquisition.check.absent import (
+    ABSENT,
+    explain_absence,
+    explain_identity,
+    explain_other_unit,
+)
 from pipelines.acquisition.check.addresses import in_words, moved_blocks, read_moved
 from pipelines.acquisition.check.by_drives import Answer
 from pipelines.acquisition.check.clock import Clock, check_clock, check_latch, measure_clock
@@ -241,18 +245,19 @@ async def _explain(
     rate_hz: float | None,
 ) -> Finding:
     """Return the likeliest mistake in the rig file that explains an error; else the error."""
-    absent = (ExcCodes.GATEWAY_PATH_UNAVIABLE, ExcCodes.GATEWAY_NO_RESPONSE)
     line, finding = probe.part.device.line, None
     try:
         if isinstance(error, Refused) and error.code in FOR_NOW:
             pass
-        elif isinstance(error, Refused) and error.code not in absent:
+        elif isinstance(error, Refused) and error.code not in ABSENT:
             finding = await _likelier_block(probe, (), rig, rate_hz)
             if not finding:
                 why = await explain_refusal(probe, error)
                 finding = probe.finding(why) if why else None
         elif isinstance(error, Refused) or not (line.has_answered and line.traffic.came):
-            finding = await explain_absence(probe, probes)
+            finding = explain_other_unit(probe, probes) or await explain_absence(probe, probes)
+        elif isinstance(error, Unanswered):
+            finding = explain_other_unit(probe, probes)
         elif any(entry["found"] != entry["expected"] for entry in device.identity):
             finding = await explain_identity(probe, probes)
     except DeviceError:

@@ -48,6 +48,16 @@ def described(asked: Asked, came: bytes) -> str | None:
     return _as_frames(asked, rest) or _as_text(rest) or _as_bytes(asked, rest)
 
 
+def answering_unit(asked: Asked, came: bytes) -> int | None:
+    """Return the unit in the frame that came in place of an answer; None if there is none."""
+    if asked.in_rtu:
+        units = [*_rtu_units(came.removeprefix(asked.frame))]
+    else:
+        in_tcp = _tcp_frame(came)
+        units = [in_tcp[1]] if in_tcp else []
+    return next((unit for unit in units if unit != asked.unit), None)
+
+
 def as_hex(data: bytes, most: int = 16) -> str:
     """Return the first bytes in hexadecimal."""
     shown = data[:most].hex(" ")
