@@ -14,6 +14,7 @@ from pipelines.diagnosis.evidence.eligibility import refuse_unfit
 from pipelines.diagnosis.evidence.known_effects import known_effects
 from pipelines.diagnosis.evidence.noise_floor import noise_floor
 from pipelines.diagnosis.evidence.observed_run import Run, observe
+from pipelines.effects.effect import Effect
 from pipelines.errors import InputError
 from pipelines.estimation.angle_noise import CUTOFF_HZ, is_loud
 from pipelines.mechanics.even_grid import on_even_grid
@@ -76,18 +77,45 @@ def training_data(
     motions = on_one_scale(motions)
     refuse_unfit(motions)
     effects = known_effects(known, motions[0].machine)
-    faults = tuple(find_faults(motions, accept))
+    faults = find_faults(motions, accept)
+    try:
+        return _prepared(motions, faults, effects)
+    except InputError:
+        # Too little remains without samples that the user accepts: they are used as recorded.
+        accepted = [_accepted(fault, accept) for fault in faults]
+        if accepted == faults:
+            raise
+        return _prepared(motions, accepted, effects)
+
+
+def _accepted(fault: Fault, accept: Sequence[FaultKind]) -> Fault:
+    """Return a fault whose samples are used as recorded, if the user accepts its kind."""
+    if fault.samples is None or fault.kind not in accept:
+        return fault
+    # A run that is left out whole has others in its place.
+    is_part = fault.samples.any() and not fault.samples.all()
+    return fault.used_as_recorded() if is_part else fault
+
+
+def _prepared(
+    motions: Sequence[Motion], faults: Sequence[Fault], effects: Sequence[Effect]
+) -> TrainingData:
+    """Return the runs without the samples that faults leave out, and the baseline.
+
+    Raises
+    ------
+    InputError
+        Too little remains to train, to validate or to estimate the noise.
+    """
     valid = [
         downsampled(on_even_grid(motion))
         for motion in excluding(motions, faults)
         if motion.valid.any()
     ]
     _refuse_missing_purpose(valid, faults)
-    runs = [observe(motion) for motion in valid]
     # Training runs alone decide, as no fit may depend on validation runs.
     noisy = is_loud([motion for motion in valid if motion.purpose == "train"])
-    if noisy:
-        runs = [observe(motion, CUTOFF_HZ) for motion in valid]
+    runs = [observe(motion, CUTOFF_HZ if noisy else None) for motion in valid]
     train, validate = (
         tuple(run for run in runs if run.motion.purpose == purpose)
         for purpose in ("train", "validate")
@@ -100,7 +128,7 @@ def training_data(
         train,
         tuple(only_trained_outputs(run, baseline) for run in validate),
         baseline,
-        faults,
+        tuple(faults),
         noisy,
     )
 

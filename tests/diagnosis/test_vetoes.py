@@ -3,6 +3,7 @@
 from dataclasses import replace
 
 import numpy as np
+import pandas as pd
 import pytest
 
 from pipelines.contracts.fault_kind import FaultKind
@@ -10,8 +11,9 @@ from pipelines.diagnosis.data_faults import find_faults
 from pipelines.diagnosis.data_faults.proof import Proof, Ruling
 from pipelines.diagnosis.data_faults.sign_bit import _joined
 from pipelines.diagnosis.diagnose import diagnose
+from pipelines.diagnosis.training_data import training_data
 from pipelines.diagnosis.verdict.verdict import verdict
-from pipelines.errors import SettingsError
+from pipelines.errors import InputError, SettingsError
 from pipelines.mechanics.motion import Motion
 from pipelines.mechanics.scale import on_one_scale
 from pipelines.settings.diagnose import DiagnoseSettings
@@ -167,3 +169,30 @@ def test_a_run_that_is_stuck_nearly_throughout_is_judged_by_the_good_samples_of_
     assert fault.is_veto and fault.proof.recorded > 2.0 * fault.proof.mended
     accepted = find_faults([stuck, runs[1]], [FaultKind.STUCK])
     assert not any(f.spoils for f in accepted) and any(f.accepted for f in accepted)
+
+
+def held(frame, rows=20):
+    """Return a recording whose values are read anew in every so many rows only."""
+    values = [name for name in frame.columns if name not in ("time_s", "sequence")]
+    latest = np.arange(len(frame)) // rows * rows
+    return frame.assign(**{name: frame[name].to_numpy()[latest] for name in values})
+
+
+def test_samples_that_leave_too_little_are_used_as_recorded_where_their_kind_is_accepted():
+    runs = motions(pendulum, held, spring=1.0)
+    with pytest.raises(InputError, match=r"correct first .* repeated samples \(95 %\)"):
+        diagnose(runs)
+    with pytest.raises(InputError, match="repeated samples"):
+        diagnose(runs, accept=(FaultKind.CLOCK,))
+    outcome = verdict(diagnose(runs, accept=(FaultKind.STALE,)))
+    assert outcome["accepted"] == ["stale"] and not outcome["acquisition_at_fault"]
+    assert outcome["status"] == "explained" and "parallel spring" in outcome["finding"]
+    accepted = [c for c in outcome["caveats"] if 'accepted by [diagnose] accept = ["stale"]' in c]
+    assert len(accepted) == len(runs)
+
+
+def test_samples_whose_kind_is_accepted_are_left_out_all_the_same_where_enough_remain():
+    runs = motions(pendulum, lambda frame: pd.concat([held(frame[:400]), frame[400:]]))
+    data = training_data(runs, accept=[FaultKind.STALE])
+    assert {fault.kind for fault in data.left_out} == {FaultKind.STALE}
+    assert not data.doubts

@@ -30,7 +30,7 @@ class Fault:
     without_cuffs: bool = False
     """Whether the run's cuff forces are left out."""
     accepted: bool = False
-    """Whether the user overruled its veto."""
+    """Whether the user overruled its veto, or that its samples are left out."""
 
     @property
     def ruling(self) -> Ruling:
@@ -55,14 +55,18 @@ class Fault:
     @property
     def in_words(self) -> str:
         """The fault, its remedy, its proof, and how to overrule it."""
-        if self.proof is None:
-            return self.what
-        sentences = f"{self.what}. {self.proof.in_words}"
+        sentences = f"{self.what}. {self.proof.in_words}" if self.proof else self.what
         if self.accepted:
             return f'{sentences}; accepted by [diagnose] accept = ["{self.kind}"]'
+        if self.proof is None:
+            return sentences
         if self.is_veto:
             return f'{sentences}; if it is right as it is, set [diagnose] accept = ["{self.kind}"]'
         return f"{sentences}: too little to stop at"
+
+    def used_as_recorded(self) -> "Fault":
+        """Return the fault of samples that the user accepts as they are."""
+        return replace(self, samples=None, accepted=True)
 
     def judged(self, accept: tuple[FaultKind, ...]) -> "Fault":
         """Return the fault, accepted where the user overrules a veto of its kind."""

@@ -129,6 +129,9 @@ def _correlation_time(series: Sequence[NDArray]) -> float:
     # The torque of a passive joint is constant: it has no noise.
     for lag in range(1, 40) if variance > 0.0 else ():
         products = np.concatenate([s[lag:] * s[:-lag] for s in series])
+        # Between gaps no two blocks may be so far apart.
+        if np.isnan(products).all():
+            break
         rho = np.nanmean(products) / variance
         # Beyond the first small correlation the sum would collect errors of estimates.
         if not rho > 0.05:
