@@ -28,9 +28,9 @@ from pipelines.errors import InputError
 from pipelines.mechanics.geometry import Geometry
 from pipelines.mechanics.instant import REACTION
 from pipelines.mechanics.machine import Machine
-from pipelines.mechanics.mechanisms.leg import LEG, potential_energy
+from pipelines.mechanics.mechanisms.leg import LEG
 from pipelines.model import Model, Term
-from tests.mechanics.equations import gravity_torque
+from tests.mechanics.equations import gravity_torque, potential_energy
 
 X = np.array([2.6, 0.63, 1.78, 5.7])
 GEOMETRY = Geometry()

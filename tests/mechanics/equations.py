@@ -1,4 +1,4 @@
-"""Coriolis matrix and gravity of a mechanism, each from its regressor."""
+"""Coriolis matrix and gravity of a mechanism from its regressor, and the potential of a leg."""
 
 from dataclasses import replace
 
@@ -33,3 +33,13 @@ def gravity_torque(mechanism, q, X, geometry):
     """Return the torque G(q) that holds the machine at rest, (J,)."""
     still = np.zeros(len(mechanism.kinds))
     return torque(mechanism, q, still, still, X, geometry)
+
+
+def potential_energy(q, X, geometry):
+    """Return the potential energy of a leg, J, zero with both joint axes level.
+
+    Source: paper, eq. 3 and 4, in terms of X.
+    """
+    q1, q2 = q
+    # Angles count from hanging down, so that mass below the hip's axis has negative energy.
+    return -geometry.gravity_m_s2 * float(X[3] * np.cos(q1) + X[2] * np.cos(q1 + q2))

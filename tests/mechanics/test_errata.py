@@ -10,10 +10,10 @@ from scipy.integrate import solve_ivp
 
 from pipelines.mechanics.fourier import FourierTrajectory
 from pipelines.mechanics.geometry import Geometry
-from pipelines.mechanics.mechanisms.leg import LEG, potential_energy, regressor_at
+from pipelines.mechanics.mechanisms.leg import LEG, regressor_at
 from pipelines.mechanics.trajectory import read_trajectory
 from pipelines.settings import datasets
-from tests.mechanics.equations import coriolis_matrix, gravity_torque
+from tests.mechanics.equations import coriolis_matrix, gravity_torque, potential_energy
 
 GEOMETRY = Geometry()
 LENGTH, GRAVITY = GEOMETRY.thigh_length_m, GEOMETRY.gravity_m_s2

@@ -5,8 +5,8 @@ import pytest
 from numpy.testing import assert_allclose
 
 from pipelines.mechanics.geometry import Geometry
-from pipelines.mechanics.mechanisms.leg import LEG, cuff_torque, potential_energy
-from tests.mechanics.equations import coriolis_matrix, gravity_torque
+from pipelines.mechanics.mechanisms.leg import LEG, cuff_torque
+from tests.mechanics.equations import coriolis_matrix, gravity_torque, potential_energy
 
 GEOMETRY = Geometry()
 TABLE3 = np.array([10.3016, 3.0157, 2.2664, 5.5354])

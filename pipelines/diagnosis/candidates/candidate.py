@@ -96,20 +96,18 @@ class Candidate:
         """Whether the effect changes kinematics or readings, and adds no torque of its own."""
         return transforms_motion(self.effect)
 
-    def columns_in(self, kinds: Sequence[str], start: int = 0) -> TermColumns:
+    def columns_in(self, kinds: Sequence[str]) -> TermColumns:
         """Return the places of the candidate's columns.
 
         Parameters
         ----------
         kinds : sequence of str
             Kind of each run.
-        start : int, optional
-            Number of the first column.
         """
         # A transformed motion gives a column for each direction, or one for the shape.
         width = max(1, len(self.directions))
         per_run = [self.effect.per_run] * width if self.transforms_motion else None
-        return TermColumns.of(self.effect, kinds, per_run, start)
+        return TermColumns.of(self.effect, kinds, per_run)
 
     def typical(self, kinds: Sequence[str]) -> NDArray:
         """Return the amplitude of each column of an effect as large as on other machines.

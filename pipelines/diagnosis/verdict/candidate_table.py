@@ -52,7 +52,7 @@ def _row(
     own = gain(d.before.errors, fitted.errors) if fitted else None
     row: dict[str, Any] = {
         "causes": sorted(labels),
-        "parameters": _parameters(fitted, d) if fitted else [],
+        "parameters": _parameters(fitted) if fitted else [],
         "train_score": _log_odds(d, probability or 0.0),
         "gain_nm": own and own.value,
         "gain_low_nm": own and own.low,
@@ -83,7 +83,7 @@ def _fitted(d: Diagnosis, labels: Set[str]) -> ValidationResult | None:
     return d.without[next(iter(missing))] if len(missing) == 1 and labels < named else None
 
 
-def _parameters(fitted: ValidationResult, d: Diagnosis) -> list[dict[str, Any]]:
+def _parameters(fitted: ValidationResult) -> list[dict[str, Any]]:
     """Return the fitted parameters with their names in files; per-run parameters are left out."""
     rows: list[dict[str, Any]] = []
     for number, cause in enumerate(fitted.fit.causes):

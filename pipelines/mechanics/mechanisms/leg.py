@@ -145,30 +145,6 @@ def _payload_change(at, state, values, geometry, joint, out):
         out[1] += moment * (knee[2] + r * knee[1])
 
 
-def potential_energy(q, X, geometry: Geometry) -> float:
-    """Return the potential energy of the leg.
-
-    Source: paper, eq. 3 and 4, in terms of X.
-
-    Parameters
-    ----------
-    q : (2,) array
-        Angles of hip and knee, rad.
-    X : (4,) array
-        X1 to X4.
-    geometry : Geometry
-        Gravity, m/s².
-
-    Returns
-    -------
-    float
-        J, zero with both joint axes level.
-    """
-    q1, q2 = q
-    # Angles count from hanging down, so that mass below the hip's axis has negative energy.
-    return -geometry.gravity_m_s2 * float(X[3] * cos(q1) + X[2] * cos(q1 + q2))
-
-
 def _broken(X: NDArray, geometry: Geometry) -> list[str]:
     """List violated conditions of a real leg: X2 > 0 and X2 (X1 - X2) > (L1 X3)².
 

@@ -7,7 +7,7 @@ from numpy.testing import assert_allclose
 from scipy.linalg import eigh
 
 from pipelines.mechanics.geometry import Geometry
-from pipelines.mechanics.mechanisms.leg import LEG, cuff_torque, potential_energy
+from pipelines.mechanics.mechanisms.leg import LEG, cuff_torque
 from tests.campaigns.blind import loop
 from tests.campaigns.blind.body import PAYLOAD_INERTIA, Body, Payload, Segment
 from tests.campaigns.blind.causes import FIRM_CUFF
@@ -18,6 +18,7 @@ from tests.campaigns.blind.plan import HIP, KNEE, Plan, Run
 from tests.campaigns.blind.plant import empty_log, move
 from tests.campaigns.blind.recorded import Rig
 from tests.campaigns.blind.transmissions import ELASTIC
+from tests.mechanics.equations import potential_energy
 
 SEED = 900_000
 PERSON = Person(75.0, 1.75)
