@@ -193,58 +193,92 @@ def _across_joints(x: NDArray, spans: Spans) -> Iterator[tuple[int, NDArray]]:
             yield int(a + b - 1), pulls / largest
 
 
-def _laws_of(run: Run, spans: Spans, load: NDArray, j: int) -> Iterator[tuple[str, int, NDArray]]:
-    """Yield kind, degree and column (m,) of each law at one joint."""
+LawTerm = tuple[str, int, NDArray]
+"""Kind, degree and column (m,) of a smooth law."""
+
+
+def _laws_of(run: Run, spans: Spans, load: NDArray, j: int) -> Iterator[LawTerm]:
+    """Yield the laws at one joint."""
     q = _of_angle(run, spans)
-    v, a = run.state[1] / spans.speed, run.state[2] / spans.acceleration
-    sign, tau = np.sign(run.state[1]), load / spans.torque
-    here, way, force = v[:, j], sign[:, j], tau[:, j]
-    yield from _scaled("angle", q[j], range(q[j].shape[1]))
-    yield from _speed_laws(here, way)
-    # Coulomb friction first, then viscous. Degree 0 of both is in the baseline.
-    yield from _scaled("friction_by_angle", q[j], range(1, 5), way)
-    yield from _scaled("friction_by_angle", q[j], range(1, 4), here)
-    yield from _scaled("inertia_by_angle", q[j], range(3), a[:, j])
-    root = np.sqrt(np.abs(force))
-    joints = run.motion.machine.joints
+    scaled = _ScaledMotion(
+        q, run.state[1] / spans.speed, run.state[2] / spans.acceleration, load / spans.torque
+    )
+    passive = [joint.is_passive for joint in run.motion.machine.joints]
+    yield from scaled.laws_of_itself(j)
     # A passive joint carries no load: what is predicted there is the residual itself, and a gain on
     # it would explain all of that.
-    if not joints[j].is_passive:
-        # The first two are friction that grows with the load. The others are a gain that depends on
-        # the load's sign or size.
-        for column in (np.abs(force) * way, root * way, np.abs(force), force * np.abs(force)):
-            yield "load", 1, column
+    if not passive[j]:
+        yield from scaled.laws_of_load(j)
     # Half waves over the longest run: the slowest change is a single rise or fall.
     phase = np.pi * (run.time - run.time[0]) / spans.duration_s
-    if not joints[j].is_passive:
+    if not passive[j]:
         # A constant gain of the drives would let bodies without inertia explain that a passive
         # joint has no torque.
-        lowest = 1 if any(joint.is_passive for joint in joints) else 0
-        for k in range(lowest, 4):
-            yield "gain_over_time", k, force * np.cos(k * phase)
+        for k in range(1 if any(passive) else 0, 4):
+            yield "gain_over_time", k, scaled.tau[:, j] * np.cos(k * phase)
     for k in range(1, 4):
-        yield "friction_over_time", k, way * np.cos(k * phase)
-        yield "friction_over_time", k, here * np.cos(k * phase)
+        yield "friction_over_time", k, scaled.way[:, j] * np.cos(k * phase)
+        yield "friction_over_time", k, scaled.v[:, j] * np.cos(k * phase)
     if len(q) > 1:
         yield from _scaled("both_angles", _of_sum(run, spans), range(1, 6))
     for o in range(len(q)):
-        if o == j:
-            continue
-        yield from _scaled("other_angle", q[o], range(1, 6))
+        if o != j:
+            yield from scaled.laws_of_another(j, o, carries_load=not passive[o])
+
+
+@dataclass(frozen=True)
+class _ScaledMotion:
+    """The motion of J joints as shares of its spans, m samples."""
+
+    q: Sequence[NDArray]
+    """Functions (m, k) of each joint's angle."""
+    v: NDArray
+    a: NDArray
+    tau: NDArray
+    """(m, J) each."""
+
+    @property
+    def way(self) -> NDArray:
+        """Direction of each joint, (m, J)."""
+        return np.sign(self.v)
+
+    def laws_of_itself(self, j: int) -> Iterator[LawTerm]:
+        """Yield laws of a joint's own angle, speed and acceleration."""
+        here, way = self.v[:, j], self.way[:, j]
+        yield from _scaled("angle", self.q[j], range(self.q[j].shape[1]))
+        yield from _speed_laws(here, way)
+        # Coulomb friction first, then viscous. Degree 0 of both is in the baseline.
+        yield from _scaled("friction_by_angle", self.q[j], range(1, 5), way)
+        yield from _scaled("friction_by_angle", self.q[j], range(1, 4), here)
+        yield from _scaled("inertia_by_angle", self.q[j], range(3), self.a[:, j])
+
+    def laws_of_load(self, j: int) -> Iterator[LawTerm]:
+        """Yield laws of a joint's own load."""
+        force, way = self.tau[:, j], self.way[:, j]
+        size = np.abs(force)
+        # The first two are friction that grows with the load. The others are a gain that depends on
+        # the load's sign or size.
+        for column in (size * way, np.sqrt(size) * way, size, force * size):
+            yield "load", 1, column
+
+    def laws_of_another(self, j: int, o: int, *, carries_load: bool) -> Iterator[LawTerm]:
+        """Yield laws at joint ``j`` of joint ``o``'s motion, and of its load if it carries one."""
+        here, way = self.v[:, j], self.way[:, j]
+        yield from _scaled("other_angle", self.q[o], range(1, 6))
         # The first function of an angle is the scaled angle itself, or its sine.
-        one, two = q[j][:, 1], q[o][:, 1]
+        one, two = self.q[j][:, 1], self.q[o][:, 1]
         yield "both_angles", 2, one * two
         yield "both_angles", 3, one**2 * two
         yield "both_angles", 3, one * two**2
-        other, other_way = v[:, o], sign[:, o]
-        for column in (other_way, other, np.abs(other), other * np.abs(other), here * other):
+        other = self.v[:, o]
+        for column in (self.way[:, o], other, np.abs(other), other * np.abs(other), here * other):
             yield "other_speed", 1, column
-        if not joints[o].is_passive:
-            yield "other_load", 1, tau[:, o]
-            yield "other_load", 1, np.abs(tau[:, o]) * way
-        yield from _scaled("friction_by_other_angle", q[o], range(1, 4), way)
-        yield from _scaled("friction_by_other_angle", q[o], range(1, 3), here)
-        yield "inertia_by_angle", 2, a[:, o]
+        if carries_load:
+            yield "other_load", 1, self.tau[:, o]
+            yield "other_load", 1, np.abs(self.tau[:, o]) * way
+        yield from _scaled("friction_by_other_angle", self.q[o], range(1, 4), way)
+        yield from _scaled("friction_by_other_angle", self.q[o], range(1, 3), here)
+        yield "inertia_by_angle", 2, self.a[:, o]
 
 
 def _scaled(
