@@ -79,12 +79,7 @@ def record_only(
     refuse_leftover(journal_path)
     open_folder(output.parent)
     metadata = _metadata(rig, run, mechanism, sample_rate_hz)
-    config = {
-        "run": run.model_dump(mode="json"),
-        "acquire": {"sample_rate_hz": sample_rate_hz},
-        "rig": rig.public(),
-    }
-    metadata |= describe([rig_path], config)
+    metadata |= _provenance(rig_path, rig, run, sample_rate_hz)
     logging.getLogger("pymodbus").setLevel(logging.CRITICAL)  # our errors say it
     with exclusive_access(rig), urgent(), collected_signals() as stopped_by:
         recorder = _Recorder(rig, run, sample_rate_hz, stopped_by, report)
@@ -125,6 +120,18 @@ def _metadata(
         "geometry": mechanism.geometry | rig.geometry.model_dump(exclude_none=True),
         "joints": [joint.metadata for joint in mechanism.all_joints],
     }
+
+
+def _provenance(
+    rig_path: Path, rig: RecordingRig, run: RunSettings, sample_rate_hz: float
+) -> dict[str, Any]:
+    """Return the hash of the rig file and the settings in force."""
+    config = {
+        "run": run.model_dump(mode="json"),
+        "acquire": {"sample_rate_hz": sample_rate_hz},
+        "rig": rig.public(),
+    }
+    return describe([rig_path], config)
 
 
 class _Recorder:
@@ -191,16 +198,27 @@ class _Recorder:
                 if at > number:
                     number, answered_at, fault = at, time.monotonic(), None
                     if number < self._planned:
-                        self._widths.append(row.answered - row.asked)
-                        for whole in torn.take([seconds, *row.values, number], number, row.values):
-                            journal.append(whole)
-                        self._torn_rows = torn.torn
+                        self._write(row, number, seconds, torn, journal)
             now = time.monotonic()
             if now - answered_at > self._watchdog_s:
                 raise self._expired(now - answered_at, fault, machine)
             if now - reported_at >= 1.0:
                 reported_at = now
                 self._report((number + 1) / self._rate_hz, journal.rows)
+
+    def _write(
+        self,
+        row: ReadOnlyRow,
+        number: int,
+        seconds: float,
+        torn: TornRows[list[float]],
+        journal: Journal,
+    ) -> None:
+        """Write the rows that are known to be whole once this one has come."""
+        self._widths.append(row.answered - row.asked)
+        for whole in torn.take([seconds, *row.values, number], number, row.values):
+            journal.append(whole)
+        self._torn_rows = torn.torn
 
     def _expired(
         self, waited_s: float, fault: DeviceError | None, machine: ReadOnlyMachine

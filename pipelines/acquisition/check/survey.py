@@ -103,30 +103,8 @@ async def survey(machine: Machine, rate_hz: float | None, *, is_empty: bool) -> 
         Whether no person is in the machine.
     """
     report = RigReport(rate_hz)
-    present: dict[Probe, tuple[DeviceReport, Series]] = {}
     probes = probes_of(machine)
-    lost = await _connect(probes)
-    for line, why in lost.items():
-        report.findings.append(
-            _finding_of(why, [probe for probe in probes if probe.part.device.line is line])
-        )
-    for probe in probes:
-        device = DeviceReport(probe.name, probe.part.device.label)
-        report.devices.append(device)
-        if probe.part.device.line in lost:
-            continue
-        try:
-            await _measure_device(probe, device, list(present))
-        except DeviceError as error:
-            finding = await _explain(probe, error, device, probes, machine.rig, rate_hz)
-            if finding not in report.findings:  # a lost line gives one error for all its devices
-                report.findings.append(finding)
-        else:
-            still = probe.take()
-            device.latency = Latency.of(still.answered - still.asked)
-            if device.faults:
-                report.findings.append(probe.finding(device.faults))
-            present[probe] = device, still
+    present = await _read_alone(probes, report, machine.rig)
     # In lockstep the drives advance only together.
     if len(present) == len(report.devices) or machine.rig.clock == "real_time":
         report.findings += await _measure_cycles(list(present), report)
@@ -145,6 +123,39 @@ async def survey(machine: Machine, rate_hz: float | None, *, is_empty: bool) -> 
     return report
 
 
+async def _read_alone(
+    probes: Sequence[Probe], report: RigReport, rig: RigSettings
+) -> dict[Probe, tuple[DeviceReport, Series]]:
+    """Connect the devices and read each alone; return those that answer, with their answers.
+
+    The report gets a part for each device, and the findings about those that do not answer.
+    """
+    present: dict[Probe, tuple[DeviceReport, Series]] = {}
+    lost = await _connect(probes)
+    for line, why in lost.items():
+        report.findings.append(
+            _finding_of(why, [probe for probe in probes if probe.part.device.line is line])
+        )
+    for probe in probes:
+        device = DeviceReport(probe.name, probe.part.device.label)
+        report.devices.append(device)
+        if probe.part.device.line in lost:
+            continue
+        try:
+            await _measure_device(probe, device, list(present))
+        except DeviceError as error:
+            finding = await _explain(probe, error, device, probes, rig, report.rate_hz)
+            if finding not in report.findings:  # a lost line gives one error for all its devices
+                report.findings.append(finding)
+        else:
+            still = probe.take()
+            device.latency = Latency.of(still.answered - still.asked)
+            if device.faults:
+                report.findings.append(probe.finding(device.faults))
+            present[probe] = device, still
+    return present
+
+
 async def survey_read_only(
     machine: ReadOnlyMachine, rig: RecordingRig, rate_hz: float | None
 ) -> RigReport:
@@ -160,26 +171,32 @@ async def survey_read_only(
             report.findings.append(await _explain(probe, error, device, probes, rig, rate_hz))
             continue
         answered.append(probe)
-        series = probe.take()
-        device.latency = Latency.of(series.answered - series.asked)
-        findings = list(check_registers(probe, series, rig))
-        if "sequence" in series.block.names:
-            seconds = float(series.answered[-1] - series.answered[0])
-            device.clock = measure_clock(probe, series, seconds)
-            findings += check_clock(probe, series, device.clock, seconds, rate_hz)
-            findings += check_latch(probe, series)
-        if probe.is_drive and not {one.quantity for one in findings} & {"angle", "velocity"}:
-            findings += check_velocity(probe, series, rate_hz)
-        report.findings += [
-            *_check_speed(probe, device, rate_hz),
-            *await _with_likelier(probe, findings, rig, rate_hz),
-        ]
-        for name in series.block.names:
-            values = series.of(name)
-            device.values[name], device.noise[name] = float(np.mean(values)), float(np.std(values))
+        findings = _check_read_only(probe, device, rig, rate_hz)
+        report.findings += _check_speed(probe, device, rate_hz)
+        report.findings += await _with_likelier(probe, findings, rig, rate_hz)
     report.notes = _notes(probes)
     report.notes += [f"{one.name}: {one.faults}" for one in report.devices if one.faults]
     return report
+
+
+def _check_read_only(
+    probe: Probe, report: DeviceReport, rig: RecordingRig, rate_hz: float | None
+) -> list[Finding]:
+    """Check the answers of one device that exoid only reads."""
+    series = probe.take()
+    report.latency = Latency.of(series.answered - series.asked)
+    findings = list(check_registers(probe, series, rig))
+    if "sequence" in series.block.names:
+        seconds = float(series.answered[-1] - series.answered[0])
+        report.clock = measure_clock(probe, series, seconds)
+        findings += check_clock(probe, series, report.clock, seconds, rate_hz)
+        findings += check_latch(probe, series)
+    if probe.is_drive and not {one.quantity for one in findings} & {"angle", "velocity"}:
+        findings += check_velocity(probe, series, rate_hz)
+    for name in series.block.names:
+        values = series.of(name)
+        report.values[name], report.noise[name] = float(np.mean(values)), float(np.std(values))
+    return findings
 
 
 def _notes(probes: Sequence[Probe]) -> list[str]:
