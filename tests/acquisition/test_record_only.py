@@ -265,7 +265,7 @@ def test_the_check_counts_answers_that_fail_and_changes_no_unit_for_them(tmp_pat
     assert not report.findings
     notes = "\n".join(report.notes)
     assert "readings failed; the first answered" in notes
-    assert "it was opened again each time" in notes
+    assert "and was opened again" in notes
 
 
 @pytest.mark.parametrize(
@@ -431,6 +431,20 @@ def test_a_device_behind_a_lost_connection_is_not_taken_for_another_unit(tmp_pat
 
     with server:
         assert asyncio.run(run()) is None
+
+
+def test_a_line_that_the_other_end_closes_is_one_finding_for_all_its_joints(tmp_path):
+    server, _ = a_device(lambda n, words: words, most_answers=0)
+    port = server.getsockname()[1]
+    line = f'[line.leg]\ntransport = "tcp"\nport = {port}\n'
+    text = RIG.format(port=port, clock="", watchdog_s=1.0)
+    path = tmp_path / "bench.toml"
+    path.write_text(text.replace(f"port = {port}\n", 'line = "leg"\n') + line)
+    with server:
+        findings = check_rig(path, 100.0).findings
+    assert [one.device for one in findings] == ["rig"]
+    assert "the other end closed the line without an answer" in findings[0].text
+    assert "drive hip (unit 1), drive knee (unit 2)" in findings[0].text
 
 
 JOINT = '[[drive]]\njoint = "{}"\nport = {{port}}\nunit = {}\nmap = "plc"\n'

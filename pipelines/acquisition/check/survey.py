@@ -176,6 +176,8 @@ async def survey_read_only(
         report.findings += await _with_likelier(probe, findings, rig, rate_hz)
     report.notes = _notes(probes)
     report.notes += [f"{one.name}: {one.faults}" for one in report.devices if one.faults]
+    # A line that is lost again and again is one finding.
+    report.findings = list(dict.fromkeys(report.findings))
     return report
 
 

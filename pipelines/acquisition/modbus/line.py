@@ -105,8 +105,18 @@ class Line:
         async with self._turn:
             await self._open()
 
+    @property
+    def _is_open(self) -> bool:
+        """Whether there is a connection, as far as known."""
+        if self.has_answered or not self.client.connected:
+            return self.client.connected
+        # pymodbus takes a connection for open that the other end closed as soon as it was there,
+        # and waits for an answer on it.
+        transport = cast(asyncio.Transport | None, self.client.ctx.transport)
+        return transport is None or not transport.is_closing()
+
     async def _open(self, within_s: float | None = None) -> None:
-        if self.client.connected:
+        if self._is_open:
             return
         self._answers = 0
         self.client.ctx.comm_params.timeout_connect = within_s or self._timeout_s
@@ -120,6 +130,9 @@ class Line:
             ) from error
         if not is_open:
             raise DeviceError(f"{self.label}: {await self._refusal()}")
+        if not self._is_open:
+            self.close()
+            raise DeviceError(f"{self.label}: {self._loss()}")
 
     def close(self) -> None:
         """Close the connection, if it is open."""
@@ -226,6 +239,8 @@ class Line:
             self._reopened += lost and not self._closes
             self.close()
             await self._open(within_s)
+        elif not self.has_answered:
+            await self._open(within_s)
         await self._pause()
         # pymodbus uses this one setting as time-out of connections and replies alike.
         self.client.ctx.comm_params.timeout_connect = within_s
@@ -331,11 +346,9 @@ class Line:
                 f"{self.label}: closes its connection after each answer; each request opens a new"
                 " one, which takes time"
             )
-        if self._reopened:
-            notes.append(
-                f"{self.label}: its connection ended {self._reopened} times; it was"
-                " opened again each time"
-            )
+        if self._reopened and self.has_answered:
+            times = "once" if self._reopened == 1 else f"{self._reopened} times"
+            notes.append(f"{self.label}: its connection ended {times}, and was opened again")
         if self.takes_one_client:
             notes.append(f"{self.label}: serves one client; all devices there share a connection")
         if self.traffic.echoes:

@@ -3,6 +3,7 @@
 import asyncio
 import errno
 import re
+import time
 
 import pytest
 from hypothesis import given
@@ -129,6 +130,33 @@ def test_a_device_that_closes_the_connection_after_several_answers_is_named_as_t
     with pytest.raises(DeviceError, match=expected) as caught:
         asked_of(ask_three_times, answers=2, reset=reset)
     assert not isinstance(caught.value, Unanswered)
+
+
+def test_a_connection_that_ends_while_it_is_opened_is_named_without_waiting_for_an_answer():
+    # As of a server that serves one client, and has another.
+    async def ask(device):
+        client = device.line.client
+        device.line.close()
+        connect = client.connect
+
+        async def and_lose():
+            is_open = await connect()
+            transport = client.ctx.transport
+            transport.close()
+            await asyncio.sleep(0.02)
+            # As pymodbus leaves it where the end comes before its own `connect` goes on.
+            client.ctx.transport = transport
+            return is_open
+
+        client.connect = and_lose
+        await device.line.connect()
+        await device.read(7, 1)
+
+    began = time.monotonic()
+    with pytest.raises(DeviceError, match=r"without an answer.* no other program uses it") as why:
+        asked_of(ask, connect_s=3.0)
+    assert time.monotonic() - began < 2.0
+    assert not isinstance(why.value, Unanswered)
 
 
 def test_a_connection_that_the_system_gives_up_sends_the_user_to_cable_and_power():
