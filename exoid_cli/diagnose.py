@@ -1,8 +1,9 @@
 """``exoid diagnose``: find what the model gets wrong, its physical cause, and the gain."""
 
 import json
+from collections.abc import Collection, Sequence
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -11,6 +12,13 @@ from exoid_cli.experiment_folder import inputs_and_folder, open_experiment, sett
 from exoid_cli.options import AgainOption, ConfigOption, files_argument, output_option
 from exoid_cli.stage_runner import run_stages
 from exoid_cli.verdict_view import show_verdict
+
+if TYPE_CHECKING:
+    from pipelines.contracts import Contract
+    from pipelines.contracts.verdict import Verdict
+    from pipelines.diagnosis.diagnosis import Diagnosis
+    from pipelines.mechanics.motion import Motion
+    from pipelines.settings import Experiment
 
 
 def diagnose(
@@ -53,13 +61,9 @@ def diagnose(
       exoid diagnose recordings/*.parquet -o diagnosed/
       exoid diagnose recordings/*.parquet --known rotor_inertia@knee
     """
-    from pipelines.contracts import CANDIDATES, PARAMETERS, RESIDUALS, describe
-    from pipelines.contracts.atomic import all_or_none, folder_to_fill, write_text
-    from pipelines.contracts.provenance import recording_behind
+    from pipelines.contracts.atomic import folder_to_fill
     from pipelines.contracts.verdict import check
-    from pipelines.diagnosis.detectability.detectability import as_json, detectability
     from pipelines.diagnosis.diagnose import diagnose as find
-    from pipelines.diagnosis.verdict.candidate_table import candidates
     from pipelines.diagnosis.verdict.figures import FIGURES
     from pipelines.diagnosis.verdict.verdict import verdict
     from pipelines.mechanics.read import geometry_from, read_motions, refuse_another_mechanism
@@ -72,9 +76,8 @@ def diagnose(
     settings = settings_in_force(config)
     chosen = settings.diagnose.changed(known=known or None, accept=accept or None)
     settings = settings.model_copy(update={"diagnose": chosen})
-    tables = {"parameters": PARAMETERS, "residuals": RESIDUALS, "candidates": CANDIDATES}
     # Before the search, as its result would be lost.
-    for name, contract in tables.items():
+    for name, contract in _tables().items():
         contract.refuse_place(output / f"{name}.parquet")
     motions = read_motions(files, settings.filter, geometry_from(settings))
     refuse_another_mechanism(settings.mechanism, motions)
@@ -83,17 +86,82 @@ def diagnose(
     document = verdict(diagnosis)
     # Checked before anything is written, so that a verdict on disk is always a valid one.
     checked = check(document, str(output / "verdict.json"))
+    _write(output, diagnosis, document, checked if figures else None, motions, files, settings)
+    console.emit(document)
+    show_verdict(checked, motions[0].machine.joints)
+    console.wrote(
+        output,
+        "verdict.json",
+        *(f"{name}.parquet" for name in _tables()),
+        "detectability.json",
+        *(f"{name}.png" for name in FIGURES if figures),
+    )
+
+
+def _tables() -> "dict[str, Contract]":
+    """Return the contracts of the tables that a diagnosis writes, by their names."""
+    from pipelines.contracts import CANDIDATES, PARAMETERS, RESIDUALS
+
+    return {"parameters": PARAMETERS, "residuals": RESIDUALS, "candidates": CANDIDATES}
+
+
+def _write(
+    output: Path,
+    diagnosis: "Diagnosis",
+    document: dict[str, Any],
+    drawn: "Verdict | None",
+    motions: "Sequence[Motion]",
+    files: Sequence[Path],
+    settings: "Experiment",
+) -> None:
+    """Write all files of a diagnosis or none, with the figures of ``drawn`` if it is given."""
+    from pipelines.contracts import describe
+    from pipelines.contracts.atomic import all_or_none, write_text
+    from pipelines.diagnosis.detectability.detectability import as_json, detectability
+    from pipelines.diagnosis.verdict.candidate_table import candidates
+
     machine, geometry = motions[0].machine, motions[0].geometry
     sections = ("mechanism", "filter", "diagnose")
     used_settings = settings.sections_about(machine.is_exoskeleton, *sections)
     shared = {"joints": machine.joint_metadata} | describe(files, used_settings)
+    model = _model(diagnosis, motions, files)
+    frames = {
+        "parameters": diagnosis.parameters,
+        "residuals": diagnosis.residuals,
+        "candidates": candidates(diagnosis),
+    }
+    detectable = as_json(detectability(diagnosis.fitted_runs, diagnosis.baseline, diagnosis.floor))
+    # The verdict last: whoever sees it finds the tables of the same diagnosis next to it.
+    with all_or_none(output, last="verdict.json") as folder:
+        for name, contract in _tables().items():
+            # Without gravity, angles of residuals have no limit.
+            metadata = shared | {"geometry": machine.metadata(geometry)}
+            metadata |= model if name == "parameters" else {}
+            contract.write(folder / f"{name}.parquet", frames[name], metadata)
+        for name, content in (("detectability", detectable), ("verdict", document)):
+            text = json.dumps(content | {"provenance": shared}, indent=1, ensure_ascii=False)
+            write_text(folder / f"{name}.json", f"{text}\n")
+        if drawn:
+            from pipelines.diagnosis.verdict.figures.drawing import draw
+
+            draw(diagnosis, drawn, folder)
+        written = {path.name for path in folder.iterdir()}
+    _remove_old_figures(output, written)
+
+
+def _model(
+    diagnosis: "Diagnosis", motions: "Sequence[Motion]", files: Sequence[Path]
+) -> dict[str, Any]:
+    """Return the metadata of the extended model's parameters."""
+    from pipelines.contracts.provenance import recording_behind
+
     recordings = {}
     if diagnosis.each_run:  # hashing reads whole files
         for motion, path in zip(motions, files, strict=True):
             recordings[motion.file] = recording_behind(path)
-    model = {
+    return {
         "covariance": diagnosis.covariance.tolist(),
-        "mechanism": machine.mechanism.name,
+        "mechanism": motions[0].machine.mechanism.name,
         "method": {"name": "joint fit of baseline and named causes", "status": diagnosis.status},
         "collinear": diagnosis.collinear,
         "unrealizable": diagnosis.unrealizable,
@@ -105,37 +173,12 @@ def diagnose(
             for label, of_runs in diagnosis.each_run.items()
         },
     }
-    frames = {
-        "parameters": diagnosis.parameters,
-        "residuals": diagnosis.residuals,
-        "candidates": candidates(diagnosis),
-    }
-    detectable = as_json(detectability(diagnosis.fitted_runs, diagnosis.baseline, diagnosis.floor))
-    # The verdict last: whoever sees it finds the tables of the same diagnosis next to it.
-    with all_or_none(output, last="verdict.json") as folder:
-        for name, contract in tables.items():
-            # Without gravity, angles of residuals have no limit.
-            metadata = shared | {"geometry": machine.metadata(geometry)}
-            metadata |= model if name == "parameters" else {}
-            contract.write(folder / f"{name}.parquet", frames[name], metadata)
-        for name, content in (("detectability", detectable), ("verdict", document)):
-            text = json.dumps(content | {"provenance": shared}, indent=1, ensure_ascii=False)
-            write_text(folder / f"{name}.json", f"{text}\n")
-        if figures:
-            from pipelines.diagnosis.verdict.figures.drawing import draw
 
-            draw(diagnosis, checked, folder)
-        drawn = {path.name for path in folder.iterdir()}
-    # Figures of an earlier diagnosis would contradict the new verdict.
+
+def _remove_old_figures(output: Path, written: Collection[str]) -> None:
+    """Remove the figures of an earlier diagnosis, which would contradict the new verdict."""
+    from pipelines.diagnosis.verdict.figures import FIGURES
+
     for old in (f"{name}.{kind}" for name in FIGURES for kind in ("png", "pdf")):
-        if old not in drawn:
+        if old not in written:
             (output / old).unlink(missing_ok=True)
-    console.emit(document)
-    show_verdict(checked, machine.joints)
-    console.wrote(
-        output,
-        "verdict.json",
-        *(f"{name}.parquet" for name in tables),
-        "detectability.json",
-        *(f"{name}.png" for name in FIGURES if figures),
-    )

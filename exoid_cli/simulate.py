@@ -11,7 +11,11 @@ from exoid_cli.options import AgainOption, ConfigOption, files_argument, output_
 from exoid_cli.stage_runner import run_stages
 
 if TYPE_CHECKING:
+    from pandas import DataFrame
+
     from pipelines.contracts import Joint, Table
+    from pipelines.dynamics.plant import Plant
+    from pipelines.dynamics.tracking import ClosedLoop
     from pipelines.settings import Experiment
 
 
@@ -90,9 +94,8 @@ def _default_run(table: "Table") -> str:
 def _track(
     table: "Table", run: str, reference: Path | None, settings: "Experiment", output: Path
 ) -> None:
-    from pipelines.contracts import SIMULATION, describe
+    from pipelines.contracts import SIMULATION
     from pipelines.contracts.atomic import write_text
-    from pipelines.contracts.joints import either
     from pipelines.dynamics.plant import plant_from_table
     from pipelines.dynamics.tracking import track
     from pipelines.errors import InputError
@@ -128,9 +131,35 @@ def _track(
     with console.working("sweeping the feedback gain"):
         gains = sweep(plant, chosen, wanted, chosen.sweep_nm_s_rad)
     frame = loop.frame()
+    SIMULATION.write(output / LOOP, frame, _about_loop(table, plant, reference, settings))
+    if len(gains):
+        write_text(output / SWEEP, gains.to_csv(index=False))
+    if chosen.figures:
+        from pipelines.simulation.figures import draw_sweep, draw_tracking
+
+        limits = chosen.torque_limit_nm, chosen.settled_after_s
+        with console.working("drawing"):
+            draw_tracking(frame, plant.joints, output, *limits)
+            if len(gains):
+                draw_sweep(gains, plant.joints, output, chosen.feedback_gain_nm_s_rad)
+    _report_loop(loop, gains, plant.joints, chosen.settled_after_s)
+    tables = [LOOP, *([SWEEP] if len(gains) else [])]
+    drawn = ["tracking.png", "error.png", "torque.png", *(["kv-sweep.png"] if len(gains) else [])]
+    console.wrote(output, *tables, *(drawn if chosen.figures else []))
+    for guess in plant.guesses:
+        console.warn(guess)
+
+
+def _about_loop(
+    table: "Table", plant: "Plant", reference: Path | None, settings: "Experiment"
+) -> dict[str, Any]:
+    """Return the metadata of the adaptive loop's table."""
+    from pipelines.contracts import describe
+
+    chosen = settings.simulate
     inputs = [path for path in (table.path, reference) if path]
     config = settings.sections_about(plant.machine.is_exoskeleton, "simulate", "mechanism")
-    described = describe(inputs, config) | {
+    return describe(inputs, config) | {
         "joints": plant.machine.joint_metadata,
         "plant": plant.metadata(),
         "controller": {"type": "rbf", "reference": reference.name if reference else "gait"},
@@ -144,32 +173,24 @@ def _track(
         },
         "seed": chosen.seed,
     }
-    SIMULATION.write(output / LOOP, frame, described)
-    if len(gains):
-        write_text(output / SWEEP, gains.to_csv(index=False))
-    if chosen.figures:
-        from pipelines.simulation.figures import draw_sweep, draw_tracking
 
-        limits = chosen.torque_limit_nm, chosen.settled_after_s
-        with console.working("drawing"):
-            draw_tracking(frame, plant.joints, output, *limits)
-            if len(gains):
-                draw_sweep(gains, plant.joints, output, chosen.feedback_gain_nm_s_rad)
-    names = [joint.name for joint in plant.joints]
-    errors = dict(zip(names, loop.worst_error(chosen.settled_after_s).tolist(), strict=True))
+
+def _report_loop(
+    loop: "ClosedLoop", gains: "DataFrame", joints: "tuple[Joint, ...]", settled_after_s: float
+) -> None:
+    """Print each joint's largest error and torque in the adaptive loop."""
+    from pipelines.contracts.joints import either
+
+    names = [joint.name for joint in joints]
+    errors = dict(zip(names, loop.worst_error(settled_after_s).tolist(), strict=True))
     torques = dict(zip(names, abs(loop.run.torque).max(axis=0).tolist(), strict=True))
     result = {"largest_error_rad": errors, "peak_torque_nm": torques}
     console.emit(result | {"sweep": gains.to_dict("records")})
-    angle, torque = (either(j.unit(q) for j in plant.joints) for q in ("angle", "torque"))
-    settled = f"largest error after {chosen.settled_after_s:g} s ({angle})"
+    angle, torque = (either(j.unit(q) for j in joints) for q in ("angle", "torque"))
+    settled = f"largest error after {settled_after_s:g} s ({angle})"
     strongest = f"peak torque ({torque})"
     rows = [(name, f"{errors[name]:.4f}", f"{torques[name]:.1f}") for name in names]
     console.table(("joint", settled, strongest), rows, numbers=f"{settled}, {strongest}")
-    tables = [LOOP, *([SWEEP] if len(gains) else [])]
-    drawn = ["tracking.png", "error.png", "torque.png", *(["kv-sweep.png"] if len(gains) else [])]
-    console.wrote(output, *tables, *(drawn if chosen.figures else []))
-    for guess in plant.guesses:
-        console.warn(guess)
 
 
 def _replay(table: "Table", recording: Path, settings: "Experiment", output: Path) -> None:
