@@ -6,6 +6,7 @@ by the rules that ``split`` writes, all use it.
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
@@ -75,27 +76,61 @@ def graph(
     imported : ImportedRuns, optional
         Runs whose recordings were imported: no step makes these, see ``with_imported``.
     """
-    identified = ("residuals.parquet",)
-    # Files that these commands always write next to their target; figures are not checked.
-    diagnosed = (
-        "parameters.parquet",
-        "residuals.parquet",
-        "candidates.parquet",
-        "detectability.json",
-    )
-    config_option, runs = ("--config", config.as_posix()), experiment.run
-    validate = [run for run in runs if run.purpose == "validate"]
-    recordings = {run.name: out / "recordings" / f"{run.name}.parquet" for run in runs}
-    motions = {name: out / "motions" / path.name for name, path in recordings.items()}
-    trajectory, parameters = out / "trajectory.parquet", out / "identified" / "parameters.parquet"
+    return tuple(_Steps(experiment, config, out, imported).all())
 
-    recorded = [
-        _recorded(experiment, run, recordings[run.name], trajectory, config_option)
-        for run in runs
-        if run.name not in imported.names
-    ]
 
-    def step(
+@dataclass(frozen=True)
+class _Steps:
+    """The steps of one experiment."""
+
+    experiment: Experiment
+    config: Path
+    out: Path
+    imported: ImportedRuns
+
+    @property
+    def _config_option(self) -> tuple[str, str]:
+        return "--config", self.config.as_posix()
+
+    @property
+    def _recordings(self) -> dict[str, Path]:
+        folder = self.out / "recordings"
+        return {run.name: folder / f"{run.name}.parquet" for run in self.experiment.run}
+
+    @property
+    def _motions(self) -> dict[str, Path]:
+        folder = self.out / "motions"
+        return {name: folder / path.name for name, path in self._recordings.items()}
+
+    @property
+    def _validate(self) -> list[str]:
+        """Names of the runs to validate on."""
+        return [run.name for run in self.experiment.run if run.purpose == "validate"]
+
+    def all(self) -> Iterator[Step]:
+        """Yield each step after those it needs."""
+        steps = [*self._recorded(), *self._filtered(), self._identified()]
+        simulated = self.out / "simulated"
+        # An imported recording may lack what a model needs to be simulated.
+        may_fail = bool(self.imported.names)
+        loops = self._simulated(steps[-1].target, simulated, "simulate", "replay", may_fail)
+        if self._validate:
+            # A diagnosis measures its gain on validation runs; without one there is none.
+            steps.append(self._diagnosed())
+            extended = steps[-1].target.with_name("parameters.parquet")
+            folder = simulated / "extended"
+            again = self._simulated(extended, folder, "extended", "extended", may_fail=True)
+            loops = chain(loops, again)
+        steps += loops
+        yield from steps
+        shown = [file for one in steps if one.stage != "filter" for file in one.makes]
+        report = self._step(
+            "report", self.out / "report.html", shown, (), "report", self.out.as_posix()
+        )
+        yield replace(report, takes_all=True)
+
+    def _step(
+        self,
         stage: str,
         target: Path,
         inputs: Iterable[Path],
@@ -104,55 +139,77 @@ def graph(
         run: str | None = None,
         other_outputs: Iterable[str] = (),
     ) -> Step:
-        sections = experiment.sections_about(imported.of_a_leg, *settings)
+        sections = self.experiment.sections_about(self.imported.of_a_leg, *settings)
         # A section that exoid.toml lacks is not compared with the result's.
         counted = {name: section for name, section in sections.items() if section is not None}
         others = tuple(target.with_name(name) for name in other_outputs)
-        words = (*command, *config_option, "-o", _output(stage, target))
+        words = (*command, *self._config_option, "-o", _output(stage, target))
         return Step(stage, target, tuple(inputs), counted, words, run, other_outputs=others)
 
-    steps = list(recorded)
-    # Nothing is designed if each run has an excitation of its own, or was imported.
-    if any(trajectory in one.inputs for one in recorded):
-        steps.insert(0, step("design", trajectory, (), ("design", "mechanism"), "design"))
-    for name, recording in recordings.items():
-        called: tuple[str, ...] = ("filter", recording.as_posix())
-        steps.append(step("filter", motions[name], [recording], ["filter"], *called, run=name))
-    counted: tuple[str, ...] = ("identify", "mechanism")
-    words = ("identify", *_words(motions))
-    steps.append(
-        step("identify", parameters, motions.values(), counted, *words, other_outputs=identified)
-    )
-    if validate:  # a diagnosis measures its gain on validation runs; without one there is none
-        # It filters the recordings itself, so that [filter] counts as well.
-        verdict, counted = out / "diagnosed" / "verdict.json", ("filter", "mechanism", "diagnose")
-        words = ("diagnose", *_words(recordings))
-        steps.append(
-            step("diagnose", verdict, recordings.values(), counted, *words, other_outputs=diagnosed)
+    def _recorded(self) -> Iterator[Step]:
+        """Yield the design, if a run needs one, and the runs that were not imported."""
+        trajectory, recordings = self.out / "trajectory.parquet", self._recordings
+        recorded = [
+            _recorded(self.experiment, run, recordings[run.name], trajectory, self._config_option)
+            for run in self.experiment.run
+            if run.name not in self.imported.names
+        ]
+        # Nothing is designed if each run has an excitation of its own, or was imported.
+        if any(trajectory in one.inputs for one in recorded):
+            yield self._step("design", trajectory, (), ("design", "mechanism"), "design")
+        yield from recorded
+
+    def _filtered(self) -> Iterator[Step]:
+        motions = self._motions
+        for name, recording in self._recordings.items():
+            command = ("filter", recording.as_posix())
+            yield self._step("filter", motions[name], [recording], ["filter"], *command, run=name)
+
+    def _identified(self) -> Step:
+        return self._step(
+            "identify",
+            self.out / "identified" / "parameters.parquet",
+            self._motions.values(),
+            ("identify", "mechanism"),
+            "identify",
+            *_words(self._motions),
+            # Files that these commands always write next to their target; figures are not checked.
+            other_outputs=("residuals.parquet",),
         )
-        extended = verdict.with_name("parameters.parquet")
 
-    def simulated(model: Path, folder: Path, loop: str, replay: str) -> Iterator[Step]:
-        called: tuple[str, ...] = ("simulate", model.as_posix())
-        if imported.of_a_leg:
-            sweep = [SWEEP] if experiment.simulate.sweep_nm_s_rad else []
+    def _diagnosed(self) -> Step:
+        return self._step(
+            "diagnose",
+            self.out / "diagnosed" / "verdict.json",
+            self._recordings.values(),
+            # It filters the recordings itself, so that [filter] counts as well.
+            ("filter", "mechanism", "diagnose"),
+            "diagnose",
+            *_words(self._recordings),
+            other_outputs=(
+                "parameters.parquet",
+                "residuals.parquet",
+                "candidates.parquet",
+                "detectability.json",
+            ),
+        )
+
+    def _simulated(
+        self, model: Path, folder: Path, loop: str, replay: str, may_fail: bool
+    ) -> Iterator[Step]:
+        """Yield the adaptive loop and the replays of a model, in stages of these names."""
+        command, recordings = ("simulate", model.as_posix()), self._recordings
+        if self.imported.of_a_leg:
+            sweep = [SWEEP] if self.experiment.simulate.sweep_nm_s_rad else []
             counted = ("simulate", "mechanism")
-            yield step(loop, folder / LOOP, [model], counted, *called, other_outputs=sweep)
-        for name in (run.name for run in validate):
+            step = self._step(loop, folder / LOOP, [model], counted, *command, other_outputs=sweep)
+            yield replace(step, may_fail=may_fail)
+        for name in self._validate:
             target, inputs = folder / f"replay-{name}.parquet", [model, recordings[name]]
-            words = (*called, "--replay", recordings[name].as_posix())
+            words = (*command, "--replay", recordings[name].as_posix())
             # A replay filters its recording, too, but reads no setting of the adaptive loop.
-            yield step(replay, target, inputs, ("filter", "mechanism"), *words, run=name)
-
-    # An imported recording may lack what a model needs to be simulated.
-    loops = simulated(parameters, out / "simulated", "simulate", "replay")
-    steps += [replace(one, may_fail=bool(imported.names)) for one in loops]
-    if validate:
-        again = simulated(extended, out / "simulated" / "extended", "extended", "extended")
-        steps += [replace(one, may_fail=True) for one in again]
-    shown = [file for one in steps if one.stage != "filter" for file in one.makes]
-    report = step("report", out / "report.html", shown, (), "report", out.as_posix())
-    return (*steps, replace(report, takes_all=True))
+            step = self._step(replay, target, inputs, ("filter", "mechanism"), *words, run=name)
+            yield replace(step, may_fail=may_fail)
 
 
 LOOP, SWEEP = "rbf.parquet", "kv-sweep.csv"
