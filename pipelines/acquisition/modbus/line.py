@@ -108,10 +108,12 @@ class Line:
     @property
     def _is_open(self) -> bool:
         """Whether there is a connection, as far as known."""
-        transport = cast(asyncio.Transport | None, self.client.ctx.transport)
+        if self.has_answered or not self.client.connected:
+            return self.client.connected
         # pymodbus takes a connection for open that the other end closed as soon as it was there,
         # and waits for an answer on it.
-        return transport is not None and (self.has_answered or not transport.is_closing())
+        transport = cast(asyncio.Transport | None, self.client.ctx.transport)
+        return transport is None or not transport.is_closing()
 
     async def _open(self, within_s: float | None = None) -> None:
         if self._is_open:
