@@ -38,7 +38,7 @@ class OwnClock:
 
 
 def clocks_by_rows(time: TimeGuess, columns: Mapping[str, NDArray]) -> dict[str, str]:
-    """Return the rival clock of each column that has new values just where that has new stamps.
+    """Return the rival clock of each column (n,) with new values just where that has new stamps.
 
     Rows between are blank, or repeat the values before. A rival with a new stamp in each row of the
     main clock is not distinguished by rows.
@@ -151,7 +151,7 @@ def own_clocks(
     typed : mapping of str to str
         Units of columns that are dates or durations.
     """
-    found: dict[str, OwnClock] = {}
+    clocks_of_channels: dict[str, OwnClock] = {}
     log_s = _distinct(columns[time.columns[0]]).astype(float) * UNITS[time.unit].factor * time.scale
     for name in dict.fromkeys(clocks):
         own = _distinct(columns[name])
@@ -165,5 +165,5 @@ def own_clocks(
         apart = own_s[0] > log_s[-1] or own_s[-1] < log_s[0]
         offset_s = float(log_s[0] - own_s[0]) if apart else 0.0
         as_log = (unit, scale) == (time.unit, time.scale)
-        found[name] = OwnClock(name, unit, scale, offset_s, as_log)
-    return found
+        clocks_of_channels[name] = OwnClock(name, unit, scale, offset_s, as_log)
+    return clocks_of_channels

@@ -15,7 +15,6 @@ from numpy.typing import NDArray
 
 from pipelines.errors import InputError
 from pipelines.importing.finding import counted
-from pipelines.importing.quantities.numbers import numbers, whole_nanoseconds
 from pipelines.importing.sources.source import Columns, Source, numbered_twins
 from pipelines.importing.sources.text import open_text
 from pipelines.settings.import_map import SourceSettings
@@ -49,7 +48,8 @@ class _Segment:
         # Nanoseconds at most: LabVIEW writes more digits.
         whole, _, fraction = written.partition(".")
         stamp = f"{whole}.{fraction[:9] or 0}"
-        return float(whole_nanoseconds(np.array([stamp], object))[0]) * 1e-9
+        at = pd.to_datetime(stamp, errors="coerce", utc=True)
+        return np.nan if pd.isna(at) else float(at.timestamp())
 
 
 def open_lvm(path: Path, settings: SourceSettings) -> Source:
@@ -108,8 +108,8 @@ def _decoded(content: bytes, settings: SourceSettings) -> str:
 def _tag(line: str) -> tuple[str, str]:
     """Return the tag and the value of a line of the file's header, whatever separates them."""
     for separator in "\t,":
-        tag, found, value = line.partition(separator)
-        if found:
+        tag, mark, value = line.partition(separator)
+        if mark:
             return tag.strip(), value.strip("\t ") if separator == "\t" else value.rstrip(",")
     return line.strip(), ""
 
@@ -216,7 +216,7 @@ def _source(
         parts = [one.table[k].to_numpy() for one in segments]
         if is_clock[k]:
             clock = name
-            parts = _one_clock([numbers(part) for part in parts], segments)
+            parts = _one_clock([_numbers(part) for part in parts], segments)
         values = np.concatenate(parts)
         # LabVIEW adds a column of comments, which are few or none.
         if pd.isna(values).all():
@@ -233,6 +233,10 @@ def _source(
         clocks=clocks,
         remarks=tuple(dict.fromkeys(remarks)),
     )
+
+
+def _numbers(values: NDArray) -> NDArray:
+    return np.asarray(pd.to_numeric(pd.Series(values), errors="coerce"), dtype=float)
 
 
 def _one_clock(parts: Sequence[NDArray], segments: Sequence[_Segment]) -> list[NDArray]:

@@ -39,8 +39,8 @@ def repeats_after(time_s: NDArray, motion: NDArray) -> float | None:
         drive's errors.
     """
     on_grid = _on_grid(time_s, motion)
-    found = None if on_grid is None else _best_period(*on_grid)
-    return None if found is None else found[0]
+    best = None if on_grid is None else _best_period(*on_grid)
+    return None if best is None else best[0]
 
 
 def better_period(time_s: NDArray, motion: NDArray, period_s: float) -> float | None:
@@ -75,10 +75,10 @@ def better_period(time_s: NDArray, motion: NDArray, period_s: float) -> float | 
     given = _median_difference(columns, period_s / step)
     if given <= REPEATS:
         return None
-    found = _best_period(step, columns)
-    if found is None or given < much_worse * found[1]:
+    best = _best_period(step, columns)
+    if best is None or given < much_worse * best[1]:
         return None
-    best_s = found[0]
+    best_s = best[0]
     is_multiple = abs(period_s - best_s * round(period_s / best_s)) <= same * period_s
     return None if is_multiple else best_s
 
