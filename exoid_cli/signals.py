@@ -12,8 +12,8 @@ from pipelines.process.termination import ENDING, known, not_ignored
 class Interrupted(KeyboardInterrupt):
     """A signal asked exoid to end.
 
-    A subclass, because Python notes a KeyboardInterrupt proper that leaves ``exec``, as compilers
-    and dataclasses use it. Under ``python -m`` it then dies of SIGINT, whatever the exit code.
+    A subclass: if a KeyboardInterrupt itself leaves ``exec``, which compilers and dataclasses use,
+    Python notes that. Under ``python -m`` the process then dies of SIGINT, whatever its exit code.
     """
 
 

@@ -62,6 +62,11 @@ def per_joint(
         Whether a table must have it.
     nullable : bool, optional
         Whether values may be missing.
+
+    Raises
+    ------
+    ValueError
+        The quantity has no unit.
     """
     if quantity not in QUANTITIES:
         raise ValueError(f"{quantity}: has no unit; add it to QUANTITIES of contracts/joints.py")

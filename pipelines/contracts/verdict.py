@@ -120,7 +120,7 @@ class Law(_Object):
 
     law: str
     joint: str | None
-    """Null of a law of no single joint."""
+    """Null if the law belongs to no single joint."""
     probability: Probability
     words: str
 
@@ -199,7 +199,7 @@ class Dependence(_Object):
 
 
 class Reversal(_Object):
-    """Friction of a joint that builds up over a travel where it turns round."""
+    """Friction of a joint that builds up over a travel where it reverses."""
 
     joint: str
     travel: Number

@@ -63,9 +63,10 @@ class Parity(IntEnum):
 
 
 class Element(Enum):
-    """An element of simulators' model formats; an effect of its equation has its values, in order.
+    """An element of simulators' model formats.
 
-    A spring has its rest angle, as in ``physical``.
+    An effect with its equation has its values, in the same order. A spring has its rest angle, as
+    in ``physical``.
     """
 
     RIGID_BODIES = "inertial parameters of the mechanism"

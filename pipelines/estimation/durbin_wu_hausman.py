@@ -1,12 +1,12 @@
 """The Durbin-Wu-Hausman test of whether two estimators agree.
 
 Least squares and instrumental variables have the same limit unless the regressor correlates with
-the residual, as it does with noise in the angles. If they have, their difference over its own
-covariance is no larger than chance (Hausman, 1978, Econometrica 46(6); for robots Janot, Vandanjon
-and Gautier, 2014, Proc. ICRA). That covariance is the long-run one of the difference of both
-influence functions, so autocorrelated noise raises no alarm; its own uncertainty is allowed for as
-in Hotelling's T². Where it is nearly singular, only those combinations of parameters are tested in
-which the estimators can differ, as with Hausman's generalized inverse.
+the residual, as it does with noise in the angles. While the limits agree, the difference over its
+own covariance is no larger than chance (Hausman, 1978, Econometrica 46(6); for robots Janot,
+Vandanjon and Gautier, 2014, Proc. ICRA). That covariance is the long-run one of the difference of
+both influence functions, so autocorrelated noise raises no alarm; its own uncertainty is allowed
+for as in Hotelling's T². Where it is nearly singular, only those combinations of parameters are
+tested in which the estimators can differ, as with Hausman's generalized inverse.
 """
 
 from collections.abc import Hashable, Iterator

@@ -15,8 +15,8 @@ def on_even_grid(motion: Motion) -> Motion:
 
     A mean over uneven samples is no mean over time: samples are dense where the clock hurries and
     sparse where it is late. Cells are one period of the sample rate wide; none spans a gap.
-    The angle's mean, and those of its derivatives, are of the spline through the filtered angle;
-    those of all else of straight lines between readings.
+    The means of the angle and its derivatives are those of the spline through the filtered angle.
+    All other means are those of straight lines between readings.
 
     Parameters
     ----------

@@ -44,6 +44,6 @@ def are_held(values: NDArray) -> bool:
     if not len(steps):
         return False
     jump = float(np.median(np.abs(np.diff(values[new])))) / float(steps.min())
-    # Noise whose median jump is so many steps repeats a reading by chance in a quarter of one in
-    # as many rows; some more is no chance.
+    # Noise with a median jump of k steps repeats a reading by chance in about one of 4 k rows. A
+    # share four times as large, with a margin of 5 %, is not chance.
     return bool(repeats > 0.05 + 1.0 / jump)

@@ -72,7 +72,7 @@ VARIABLES = ("angle", "speed", "load", "time", "tone")
 
 
 def outcomes(verdict: "Verdict") -> tuple[Outcome, ...]:
-    """Return the three cases and their probabilities; nothing where physics was not looked at."""
+    """Return the three cases and their probabilities; empty where no cause was sought."""
     posterior = verdict.posterior
     if posterior is None:
         return ()

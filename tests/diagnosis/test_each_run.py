@@ -14,7 +14,7 @@ from pipelines.diagnosis.diagnose import diagnose
 from pipelines.diagnosis.evidence.baseline import baseline_of
 from pipelines.diagnosis.evidence.observed_run import observe
 from pipelines.diagnosis.fit.fitted_model import values_of_each_run
-from pipelines.diagnosis.fit.held_out import settled
+from pipelines.diagnosis.fit.held_out import terms_with_own_values
 from pipelines.diagnosis.fit.joint_fit import fit
 from pipelines.diagnosis.fit.uncertainty import Uncertainty
 from pipelines.diagnosis.verdict.figures.budget import words_of
@@ -136,7 +136,7 @@ def test_what_runs_have_of_a_cause_of_some_of_them_is_reported_of_those_alone_ea
     ]
     # A run alone, all else held, has the same values as in the fit of all.
     for run in train:
-        for term in settled(fitted, run, baseline):
+        for term in terms_with_own_values(fitted, run, baseline):
             names = [p.name for p in term.effect.parameters]
             alone = dict(zip(names, term.effect.physical(term.values), strict=True))
             for one in (one for one in values[term.effect.label] if one["file"] == run.motion.file):

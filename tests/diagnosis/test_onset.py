@@ -15,7 +15,7 @@ from pipelines.diagnosis.diagnose import diagnose
 from pipelines.diagnosis.evidence.baseline import baseline_of
 from pipelines.diagnosis.evidence.observed_run import observe
 from pipelines.diagnosis.fit.change_point import Onset
-from pipelines.diagnosis.fit.held_out import settled
+from pipelines.diagnosis.fit.held_out import terms_with_own_values
 from pipelines.diagnosis.fit.joint_refinement import Refinement
 from pipelines.diagnosis.fit.uncertainty import uncertainty
 from pipelines.diagnosis.verdict.verdict import verdict
@@ -115,7 +115,7 @@ def test_an_instant_is_found_from_wherever_the_search_begins(begun):
     runs = observed(handed("train", 5, 17.3), handed("train", 6, 29.1))
     result, baseline = fitted(runs, (17.3, begun))
     assert [shape[0] for shape in result.causes[0].shapes] == pytest.approx([17.3, 29.1], abs=0.4)
-    (term,) = settled(result, runs[1], baseline)
+    (term,) = terms_with_own_values(result, runs[1], baseline)
     assert term.shape[0] == pytest.approx(29.1, abs=0.4)
 
 

@@ -37,7 +37,7 @@ from pipelines.diagnosis.evidence.gram import solve
 from pipelines.diagnosis.evidence.known_effects import known_effects
 from pipelines.diagnosis.evidence.noise_floor import Floor, noise_floor
 from pipelines.diagnosis.evidence.observed_run import Run, observe
-from pipelines.diagnosis.fit.held_out import evaluate
+from pipelines.diagnosis.fit.held_out import held_out_residuals
 from pipelines.diagnosis.fit.joint_fit import fit
 from pipelines.diagnosis.selection.prior import FEATURES, weights
 from pipelines.effects import Effect, Parameter
@@ -341,7 +341,7 @@ def detectability_of_recorded(
     plain = fit((), runs, baseline, active)
     plain = fit((), runs, baseline, plain.weights)
     return detectability(
-        runs, baseline, noise_floor(runs, evaluate(plain, runs, baseline)), power, report
+        runs, baseline, noise_floor(runs, held_out_residuals(plain, runs, baseline)), power, report
     )
 
 

@@ -11,7 +11,7 @@ from pipelines.diagnosis.candidates.candidate import ALWAYS, NEVER
 from pipelines.diagnosis.evidence.baseline import Baseline
 from pipelines.diagnosis.evidence.observed_run import Run
 from pipelines.diagnosis.fit import parameter_rows
-from pipelines.diagnosis.fit.held_out import settled
+from pipelines.diagnosis.fit.held_out import terms_with_own_values
 from pipelines.diagnosis.fit.joint_fit import Fit
 from pipelines.diagnosis.fit.uncertainty import Uncertainty
 from pipelines.effects import Effect
@@ -37,7 +37,7 @@ def model_of_run(fit: Fit, baseline: Baseline, run: Run) -> Model:
     if not any(cause.effect.per_run for cause in fit.causes):
         return model
     # The table's per-run values are of another run, so they are fitted to this one.
-    own = {term.effect.label: term.values for term in settled(fit, run, baseline)}
+    own = {term.effect.label: term.values for term in terms_with_own_values(fit, run, baseline)}
     return Model(tuple(replace(t, values=own.get(t.effect.label, t.values)) for t in model))
 
 
@@ -68,7 +68,7 @@ def values_of_each_run(
                 )
             )
     for run in others if values_of else ():
-        for term in settled(fit, run, baseline):
+        for term in terms_with_own_values(fit, run, baseline):
             if term.effect.label in values_of and term.effect.explains(run.motion):
                 values_of[term.effect.label].append(
                     _stated_values(term.effect, run, term.effect.physical(term.values))

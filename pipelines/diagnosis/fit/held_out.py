@@ -20,7 +20,7 @@ from pipelines.diagnosis.fit.joint_fit import Fit, step_of, with_loads_of
 from pipelines.model import Model, Term
 
 
-def evaluate(fit: Fit, runs: Sequence[Run], baseline: Baseline) -> list[NDArray]:
+def held_out_residuals(fit: Fit, runs: Sequence[Run], baseline: Baseline) -> list[NDArray]:
     """Return the residuals of runs under a model fitted to other runs.
 
     Parameters
@@ -46,9 +46,8 @@ def _residual(fit: Fit, run: Run, baseline: Baseline) -> NDArray:
     residual = np.zeros_like(run.measured)
     for side in (0, 1):
         scored = half == side
-        residual[scored] = _learn(fit, run, baseline, run.usable & ~scored[:, np.newaxis])[1][
-            scored
-        ]
+        used = run.usable & ~scored[:, np.newaxis]
+        residual[scored] = _fit_own_values(fit, run, baseline, used)[1][scored]
     return residual
 
 
@@ -76,18 +75,20 @@ def _shared_term(cause: Candidate) -> Term:
     return cause.term(0)
 
 
-def settled(fit: Fit, run: Run, baseline: Baseline) -> list[Term]:
+def terms_with_own_values(fit: Fit, run: Run, baseline: Baseline) -> list[Term]:
     """Return the causes as terms of a run's model with its own onsets and phases."""
-    values, _, terms = _learn(fit, with_loads_of([run], fit, baseline)[0], baseline, run.usable)
+    values, _, terms = _fit_own_values(
+        fit, with_loads_of([run], fit, baseline)[0], baseline, run.usable
+    )
     return list(Model(tuple(terms)).with_linear(values[baseline.size :])) if terms else []
 
 
-Learnt = tuple[NDArray, NDArray, list[Term]]
+OwnFit = tuple[NDArray, NDArray, list[Term]]
 """Values, residual (m, O), and the terms with a run's own onsets."""
 
 
-def _learn(fit: Fit, run: Run, baseline: Baseline, learnt: NDArray) -> Learnt:
-    """Fit the run's own onsets, phases and shapes to the samples ``learnt``, (m, O)."""
+def _fit_own_values(fit: Fit, run: Run, baseline: Baseline, used: NDArray) -> OwnFit:
+    """Fit the run's own onsets, phases and shapes to the samples ``used``, (m, O) bool."""
     begins = [
         (number, i) for number, cause in enumerate(fit.causes) if (i := cause.onset) is not None
     ]
@@ -95,52 +96,52 @@ def _learn(fit: Fit, run: Run, baseline: Baseline, learnt: NDArray) -> Learnt:
     terms = [_shared_term(cause) for cause in fit.causes]
     for place in begins:
         terms = _with_shape(terms, *place, NEVER)
-    learned = _learn_amplitudes(fit, terms, run, baseline, learnt)
+    own_fit = _fit_amplitudes(fit, terms, run, baseline, used)
     # Onsets are sought twice, because each is found with the others held.
     for _ in range(2 if begins else 0):
         for place in begins:
-            instant = _begun(fit, learned, place, run, baseline, learnt)
-            learned = _learn_amplitudes(
-                fit, _with_shape(learned[2], *place, instant), run, baseline, learnt
+            instant = _onset_of(fit, own_fit, place, run, baseline, used)
+            own_fit = _fit_amplitudes(
+                fit, _with_shape(own_fit[2], *place, instant), run, baseline, used
             )
-    return learned
+    return own_fit
 
 
-def _begun(
-    fit: Fit, learned: Learnt, place: tuple[int, int], run: Run, baseline: Baseline, learnt: NDArray
+def _onset_of(
+    fit: Fit, own_fit: OwnFit, place: tuple[int, int], run: Run, baseline: Baseline, used: NDArray
 ) -> float:
     """Return the instant (s) at which a cause begins, all else held."""
-    values, _, terms = learned
+    values, _, terms = own_fit
     ends = [
         columns_under(_with_shape(terms, *place, end), run, baseline) for end in (NEVER, ALWAYS)
     ]
     without, throughout = (measured - columns @ values for columns, measured in ends)
-    return Onset.of(run, without, throughout, learnt, fit.weights).likeliest
+    return Onset.of(run, without, throughout, used, fit.weights).likeliest
 
 
-def _learn_amplitudes(
-    fit: Fit, terms: list[Term], run: Run, baseline: Baseline, learnt: NDArray
-) -> Learnt:
-    """Fit the run's own amplitudes and shapes to samples (m, O)."""
+def _fit_amplitudes(
+    fit: Fit, terms: list[Term], run: Run, baseline: Baseline, used: NDArray
+) -> OwnFit:
+    """Fit the run's own amplitudes and shapes to the samples ``used``, (m, O)."""
     shared, own = fit.layout.select(fit.values, None), fit.layout.per_run
-    bent, (columns, measured) = _bent(
-        fit, terms, run, baseline, columns_under(terms, run, baseline), learnt
+    shaped, (columns, measured) = _fit_shapes(
+        fit, terms, run, baseline, columns_under(terms, run, baseline), used
     )
     # Only the run's own amplitudes are fitted, or it would be no validation of the shared ones.
     values = shared.copy()
-    values[own] = _solved(columns[:, :, own], measured - columns @ shared, learnt, fit.weights)
-    return values, measured - columns @ values, bent
+    values[own] = _solved(columns[:, :, own], measured - columns @ shared, used, fit.weights)
+    return values, measured - columns @ values, shaped
 
 
-def _bent(
+def _fit_shapes(
     fit: Fit,
     terms: list[Term],
     run: Run,
     baseline: Baseline,
     plain: tuple[NDArray, NDArray],
-    learnt: NDArray,
+    used: NDArray,
 ) -> tuple[list[Term], tuple[NDArray, NDArray]]:
-    """Fit per-run shapes that transform the motion to some samples, (m, O).
+    """Fit per-run shapes that transform the motion to the samples ``used``, (m, O).
 
     Return the terms, and the columns under them, after steps of Gauss and Newton; ``plain`` are the
     columns and torques under the terms as given.
@@ -157,7 +158,7 @@ def _bent(
         slopes = [_slope(fit, terms, place, shared, run, baseline, plain) for place in places]
         # Own amplitudes move with the shapes, or shapes would make up for their errors.
         wide = np.concatenate([columns[:, :, own], *slopes], axis=2)
-        steps = _solved(wide, measured - columns @ shared, learnt, fit.weights)[int(own.sum()) :]
+        steps = _solved(wide, measured - columns @ shared, used, fit.weights)[int(own.sum()) :]
         for (number, i), step in zip(places, steps, strict=True):
             value = float(
                 np.clip(terms[number].shape[i] + step, *reach(fit.causes[number].effect.shape[i]))
@@ -167,9 +168,9 @@ def _bent(
     return terms, plain
 
 
-def _solved(columns: NDArray, target: NDArray, learnt: NDArray, weights: NDArray) -> NDArray:
-    """Return the amplitudes (k,) of columns (m, O, k) that fit a target (m, O) where learnt."""
-    root = np.sqrt(weights) * learnt
+def _solved(columns: NDArray, target: NDArray, used: NDArray, weights: NDArray) -> NDArray:
+    """Return the amplitudes (k,) of columns (m, O, k) that fit a target (m, O) where ``used``."""
+    root = np.sqrt(weights) * used
     A = (columns * root[:, :, np.newaxis]).reshape(root.size, columns.shape[2])
     # A column is zero where its effect never acts: the least norm makes its amplitude zero.
     return np.asarray(np.linalg.lstsq(A, (target * root).ravel(), rcond=1e-9)[0])

@@ -13,7 +13,7 @@ from pipelines.diagnosis.evidence.decision_band import LENGTH_S, DecisionBand
 from pipelines.diagnosis.evidence.noise_floor import Floor, noise_floor
 from pipelines.diagnosis.evidence.noise_model import NoiseModel
 from pipelines.diagnosis.evidence.observed_run import Run
-from pipelines.diagnosis.fit.held_out import evaluate
+from pipelines.diagnosis.fit.held_out import held_out_residuals
 from pipelines.diagnosis.fit.joint_fit import Fit
 from pipelines.diagnosis.fit.validation_error import Errors, errors_of
 
@@ -46,7 +46,7 @@ class ValidationResult:
         baseline : Baseline
             The fit's baseline.
         """
-        residuals = tuple(evaluate(fit, validate, baseline))
+        residuals = tuple(held_out_residuals(fit, validate, baseline))
         return cls(fit, validate, residuals, errors_of(validate, residuals))
 
     @cached_property
