@@ -7,7 +7,7 @@ twice as stiff.
 from typing import Literal, NamedTuple
 
 Kind = Literal["revolute", "prismatic"]
-Drive = Literal["measured", "none"]
+Drive = Literal["measured", "none", "unmeasured"]
 
 
 class Unit(NamedTuple):

@@ -28,10 +28,13 @@ class TorqueCrossTalk(Effect):
 
     @classmethod
     def possible(cls, machine: Machine) -> list[str | None]:
-        """Return the joints of a machine with two joints of one kind; empty for other machines."""
+        """Return the joints of a machine with two joints of one kind; empty for other machines.
+
+        Both torques must be known.
+        """
         # Between a torque and a force, the share would have a unit.
         kinds = [joint.kind for joint in machine.joints]
-        two_alike = len(kinds) == 2 and kinds[0] == kinds[1]
+        two_alike = len(kinds) == 2 and kinds[0] == kinds[1] and machine.measured.all()
         return super().possible(machine) if two_alike else []
 
     def directions(self, motions: Sequence[Motion]) -> tuple[tuple[tuple[float, ...], ...], ...]:

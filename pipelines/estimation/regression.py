@@ -34,14 +34,17 @@ class Regression:
     valid: NDArray
     """(m,) bool: whether every sample of the block is valid."""
     usable: NDArray
-    """(m, J) bool: whether the block is valid and away from that joint's reversals."""
+    """(m, J) bool: whether the block is valid and away from that joint's reversals; false at a
+    joint whose torque was not measured."""
     state: tuple[NDArray, NDArray, NDArray]
     """q, dq, ddq, (m, J) each; rad, rad/s, rad/s²."""
+    measured: NDArray
+    """(J,) bool: joints whose torque is known."""
 
     @property
     def scored(self) -> NDArray:
-        """(m,) bool: whether the block is usable at every joint, as the RMSE counts it."""
-        return np.asarray(self.usable.all(axis=1))
+        """(m,) bool: whether the block is usable at every measured joint, as the RMSE counts it."""
+        return np.asarray(self.usable[:, self.measured].all(axis=1))
 
 
 def residual_of(r: Regression, values: NDArray) -> NDArray:
@@ -243,17 +246,18 @@ def regress(piece: Piece, model: Model, cutoff_hz: float | None = None) -> Regre
             filtered(motion, np.nan_to_num(x), cutoff_hz) for x in (regressor, torque)
         )
         trusted = trusted & ~unsure(motion, cutoff_hz)
-    valid = block.all(trusted, starts)
+    valid, measured = block.all(trusted, starts), motion.machine.measured
     return Regression(
         time=block.mean(motion.time, starts),
         segment=motion.segment[starts],
         regressor=block.mean(regressor, starts),
         torque=block.mean(torque, starts),
         valid=valid,
-        usable=valid[:, np.newaxis] & block.all(away_from_reversals(motion), starts),
+        usable=valid[:, np.newaxis] & measured & block.all(away_from_reversals(motion), starts),
         state=(
             block.mean(motion.q, starts),
             block.mean(motion.dq, starts),
             block.mean(motion.ddq, starts),
         ),
+        measured=measured,
     )

@@ -114,7 +114,8 @@ def smooth_laws(run: Run, spans: Spans, load: NDArray) -> tuple[list[LawColumn],
     joints = run.state[0].shape[1]
     laws: list[LawColumn] = []
     parts: list[tuple[int | slice, NDArray]] = []
-    for j in range(joints):
+    # The torque at a joint where it was not measured shows nothing.
+    for j in np.flatnonzero(run.motion.machine.measured).tolist():
         for kind, degree, column in _laws_of(run, spans, load, j):
             # Real laws are smooth: the prior variance falls with the degree.
             laws.append(LawColumn(kind, j, "all", 1.0 / (1.0 + degree)))
@@ -209,14 +210,14 @@ def _laws_of(run: Run, spans: Spans, load: NDArray, j: int) -> Iterator[tuple[st
     joints = run.motion.machine.joints
     # A passive joint carries no load: what is predicted there is the residual itself, and a gain on
     # it would explain all of that.
-    if not joints[j].is_passive:
+    if joints[j].has_sensor:
         # The first two are friction that grows with the load. The others are a gain that depends on
         # the load's sign or size.
         for column in (np.abs(force) * way, root * way, np.abs(force), force * np.abs(force)):
             yield "load", 1, column
     # Half waves over the longest run: the slowest change is a single rise or fall.
     phase = np.pi * (run.time - run.time[0]) / spans.duration_s
-    if not joints[j].is_passive:
+    if joints[j].has_sensor:
         # A constant gain of the drives would let bodies without inertia explain that a passive
         # joint has no torque.
         lowest = 1 if any(joint.is_passive for joint in joints) else 0
@@ -239,7 +240,7 @@ def _laws_of(run: Run, spans: Spans, load: NDArray, j: int) -> Iterator[tuple[st
         other, other_way = v[:, o], sign[:, o]
         for column in (other_way, other, np.abs(other), other * np.abs(other), here * other):
             yield "other_speed", 1, column
-        if not joints[o].is_passive:
+        if joints[o].has_sensor:
             yield "other_load", 1, tau[:, o]
             yield "other_load", 1, np.abs(tau[:, o]) * way
         yield from _scaled("friction_by_other_angle", q[o], range(1, 4), way)

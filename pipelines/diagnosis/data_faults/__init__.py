@@ -75,7 +75,7 @@ def find_faults(motions: Sequence[Motion], accept: Sequence[FaultKind] = ()) -> 
 def _has_two_drives(motion: Motion) -> bool:
     """Return whether a motion is of a leg whose joints both have a drive."""
     machine = motion.machine
-    return machine.mechanism is LEG and not any(joint.is_passive for joint in machine.joints)
+    return machine.mechanism is LEG and all(joint.has_sensor for joint in machine.joints)
 
 
 def _of_legs(runs: Sequence[Averages]) -> list[Fault]:

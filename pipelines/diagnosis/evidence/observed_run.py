@@ -33,7 +33,7 @@ class Run:
     measured: NDArray
     """(m, O) N·m; zero where there is no such output."""
     usable: NDArray
-    """(m, O) bool."""
+    """(m, O) bool; false at a joint whose torque was not measured."""
     valid: NDArray
     """(m,) bool."""
     fold: NDArray
@@ -158,7 +158,8 @@ def observe(motion: Motion, cutoff_hz: float | None = None) -> Run:
     # Next to a gap a low-pass lacks the samples of one side.
     trusted = motion.valid if cutoff_hz is None else motion.valid & ~unsure(motion, cutoff_hz)
     valid = block.all(trusted, starts)
-    usable = valid[:, np.newaxis] & block.all(away_from_reversals(motion), starts)
+    away = block.all(away_from_reversals(motion), starts) & motion.machine.measured
+    usable = valid[:, np.newaxis] & away
     outputs = [motion.torque]
     cuffs = motion.cuff_torque(motion.q) if motion.run == "with_human" else None
     if cuffs is None:

@@ -1,0 +1,60 @@
+"""Find inertial parameters that no equation with a known torque contains."""
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipelines.estimation.regression import away_from_reversals
+from pipelines.mechanics.motion import Motion
+from pipelines.mechanics.run import Run, kinds_of
+from pipelines.model.parameter_layout import ParameterLayout
+
+
+def undetermined(layout: ParameterLayout, runs: Sequence[Run]) -> NDArray:
+    """Return the columns that are zero wherever a torque is known.
+
+    A thigh's own inertia loads the hip alone, so nothing determines it without the hip's torque.
+
+    Parameters
+    ----------
+    layout : ParameterLayout
+        Of p columns; only those of rigid bodies are examined.
+    runs : sequence of Run
+        The fitted runs of one machine.
+
+    Returns
+    -------
+    (p,) bool array
+        False everywhere if every torque is known.
+    """
+    result = np.zeros(layout.size, dtype=bool)
+    if not runs or runs[0].machine.measured.all():
+        return result
+    kinds = kinds_of(runs)
+    for k, places in enumerate(layout.bodies):
+        # The machine's body is fitted to runs without a wearer, if there are any.
+        kind = kinds[0] if k == 0 else "with_human"
+        columns = [c for run in runs if run.run == kind for c in _columns(run)]
+        result[places] = ~np.any(columns, axis=0)
+    return result
+
+
+def _columns(run: Run) -> Iterator[NDArray]:
+    """Yield for each piece of a run whether a column is not zero at a measured joint, (k,)."""
+    measured = run.machine.measured
+    for piece in run.pieces(0):
+        motion = _at_rest(piece.motion)
+        columns = run.machine.mechanism.regressor(motion.q, motion.dq, motion.ddq, motion.geometry)
+        yield np.any(columns[motion.valid][:, measured] != 0.0, axis=(0, 1))
+
+
+def _at_rest(motion: Motion) -> Motion:
+    """Return the motion with no velocity of joints that rest throughout.
+
+    Noise of the encoder of a joint that is held would look like motion.
+    """
+    moves = np.any(away_from_reversals(motion) & motion.valid[:, np.newaxis], axis=0)
+    rests = ~moves & ~motion.machine.measured
+    dq, ddq = (np.where(rests, 0.0, x) for x in (motion.dq, motion.ddq))
+    return motion.with_state(motion.q, dq, ddq)
