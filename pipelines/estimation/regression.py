@@ -119,13 +119,14 @@ def reversal_speeds(machine: Machine) -> NDArray:
 
 def mask_in_words(machine: Machine) -> str:
     """Describe the samples that are left out for being near a reversal."""
-    speeds = reversal_speeds(machine)
-    units = [joint.unit("velocity") for joint in machine.joints]
+    # No equation of the other joints is used.
+    speeds, names = reversal_speeds(machine)[machine.measured], machine.measured_names
+    units = [machine.joint(name).unit("velocity") for name in names]
     parts = [f"{v:.2g} {unit}" for v, unit in zip(speeds, units, strict=True)]
     alike = (
         parts[:1]
         if len(set(parts)) == 1
-        else [f"{s} ({name})" for s, name in zip(parts, machine.names, strict=True)]
+        else [f"{s} ({name})" for s, name in zip(parts, names, strict=True)]
     )
     return f"|v| < {', '.join(alike)}, padded {REVERSAL_PADDING_S:g} s"
 
