@@ -172,7 +172,25 @@ def away_from_turns(motion: Motion) -> NDArray:
     """
     # Within 75 ms of a turn measured forces and filtered acceleration are not simultaneous.
     reach = round(0.075 * motion.sample_rate_hz)
-    return np.asarray(~dilate(np.any(turns(motion), axis=1), reach))
+    # The encoder of a joint that is held may flicker, which is no turn.
+    return np.asarray(~dilate(np.any(turns(motion)[:, ~at_rest(motion)], axis=1), reach))
+
+
+def at_rest(motion: Motion) -> NDArray:
+    """Return which joints rest throughout, of those whose torque was not measured.
+
+    Parameters
+    ----------
+    motion : Motion
+        n samples of J joints.
+
+    Returns
+    -------
+    (J,) bool array
+        False at a measured joint, which must move.
+    """
+    moves = np.any(away_from_reversals(motion) & motion.valid[:, np.newaxis], axis=0)
+    return np.asarray(~moves & ~motion.machine.measured)
 
 
 def turns(motion: Motion) -> NDArray:

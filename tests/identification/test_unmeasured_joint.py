@@ -11,6 +11,7 @@ from pipelines.contracts import RECORDING
 from pipelines.contracts.table import Table
 from pipelines.errors import ContractError, InputError
 from pipelines.estimation.estimators import estimator_named
+from pipelines.estimation.regression import away_from_turns
 from pipelines.identification import identify
 from pipelines.mechanics.kinematics import motion_table
 from pipelines.mechanics.motion import motion_from_table
@@ -118,6 +119,12 @@ def test_the_hip_shows_the_coupling_where_the_knee_rests_at_another_angle_in_eac
     table = identify([braked_knee(*place) for place in places]).parameters
     assert list(table["name"]) == ["X1", "X3", "X4", "coulomb", "viscous"]
     assert np.allclose(table["value"], [1.4, X3, 2.2, COULOMB, VISCOUS], rtol=0.02)
+
+
+def test_a_flickering_encoder_of_a_held_joint_shows_no_turns():
+    still, flickering = motions()[0], motions(counts=True)[0]
+    shares = [away_from_turns(motion).mean() for motion in (still, flickering)]
+    assert shares[1] == pytest.approx(shares[0], abs=0.02) and shares[0] > 0.5
 
 
 def test_a_torque_that_is_in_the_file_is_ignored_at_such_a_joint():
