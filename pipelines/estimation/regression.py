@@ -172,8 +172,25 @@ def away_from_turns(motion: Motion) -> NDArray:
     """
     # Within 75 ms of a turn measured forces and filtered acceleration are not simultaneous.
     reach = round(0.075 * motion.sample_rate_hz)
-    # The encoder of a joint that is held may flicker, which is no turn.
-    return np.asarray(~dilate(np.any(turns(motion)[:, ~at_rest(motion)], axis=1), reach))
+    return np.asarray(~dilate(np.any(turns(with_rest(motion)), axis=1), reach))
+
+
+def with_rest(motion: Motion) -> Motion:
+    """Return the motion without the velocity of joints that rest throughout (``at_rest``).
+
+    Noise of the encoder of a joint that is held would be an acceleration, which no torque has.
+
+    Parameters
+    ----------
+    motion : Motion
+        n samples of J joints.
+    """
+    # Most machines have every torque, and nothing to look for.
+    if motion.machine.measured.all():
+        return motion
+    rests = at_rest(motion)
+    dq, ddq = (np.where(rests, 0.0, x) for x in (motion.dq, motion.ddq))
+    return motion.with_state(motion.q, dq, ddq)
 
 
 def at_rest(motion: Motion) -> NDArray:
@@ -254,7 +271,7 @@ def regress(piece: Piece, model: Model, cutoff_hz: float | None = None) -> Regre
     Regression
         m block means: regressor (m, J, p), N·m per unit; torque (m, J), N·m.
     """
-    motion, core = piece.motion, piece.core
+    motion, core = with_rest(piece.motion), piece.core
     block = block_average(motion)
     starts = block.starts(motion.segment, piece.before)
     starts = starts[(starts >= core.start) & (starts < core.stop)]

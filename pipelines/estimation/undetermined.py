@@ -5,8 +5,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from pipelines.estimation.regression import at_rest
-from pipelines.mechanics.motion import Motion
+from pipelines.estimation.regression import with_rest
 from pipelines.mechanics.run import Run, kinds_of
 from pipelines.model.parameter_layout import ParameterLayout
 
@@ -44,15 +43,6 @@ def _columns(run: Run) -> Iterator[NDArray]:
     """Yield for each piece of a run whether a column is not zero at a measured joint, (k,)."""
     measured = run.machine.measured
     for piece in run.pieces(0):
-        motion = _without_flicker(piece.motion)
+        motion = with_rest(piece.motion)
         columns = run.machine.mechanism.regressor(motion.q, motion.dq, motion.ddq, motion.geometry)
         yield np.any(columns[motion.valid][:, measured] != 0.0, axis=(0, 1))
-
-
-def _without_flicker(motion: Motion) -> Motion:
-    """Return the motion with no velocity of joints that rest throughout.
-
-    Noise of the encoder of a joint that is held would look like motion.
-    """
-    dq, ddq = (np.where(at_rest(motion), 0.0, x) for x in (motion.dq, motion.ddq))
-    return motion.with_state(motion.q, dq, ddq)

@@ -265,7 +265,8 @@ def _with_consistent_loads(
         )
         fitted_bodies = _bodies(training, _values(_in_steps(training, WeightedLeastSquares())))
         step = np.concatenate([fitted_bodies[kind] for kind in kinds]) - values
-        if np.all(np.abs(step) < tolerance * np.abs(values)):
+        # A parameter that nothing determines stays at zero.
+        if np.all(np.abs(step) <= tolerance * np.abs(values)):
             return training, True
         growth = 0.0
         # If the map has slope g, a step of length l leaves 1 - l (1 - g) of the residual. The ratio

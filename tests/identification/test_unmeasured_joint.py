@@ -13,6 +13,7 @@ from pipelines.errors import ContractError, InputError
 from pipelines.estimation.estimators import estimator_named
 from pipelines.estimation.regression import away_from_turns
 from pipelines.identification import identify
+from pipelines.identification.extension import Extension, chosen
 from pipelines.mechanics.kinematics import motion_table
 from pipelines.mechanics.motion import motion_from_table
 from pipelines.settings.filter import FilterSettings
@@ -64,10 +65,11 @@ def braked_leg(purpose, seed, hip_rad, hip_torque=None, gravity=GRAVITY, counts=
     return Table(frame, metadata, Path(f"{purpose}{seed}.parquet"))
 
 
-def motions(**changed):
+def motions(cutoff_hz="auto", **changed):
     places = (("train", 1, 0.2), ("train", 2, -0.4), ("validate", 3, 0.5))
     tables = [braked_leg(*place, **changed) for place in places]
-    return [motion_from_table(motion_table(table, FilterSettings())) for table in tables]
+    settings = FilterSettings(cutoff_hz=cutoff_hz)
+    return [motion_from_table(motion_table(table, settings)) for table in tables]
 
 
 def braked_knee(purpose, seed, knee_rad):
@@ -125,6 +127,13 @@ def test_a_flickering_encoder_of_a_held_joint_shows_no_turns():
     still, flickering = motions()[0], motions(counts=True)[0]
     shares = [away_from_turns(motion).mean() for motion in (still, flickering)]
     assert shares[1] == pytest.approx(shares[0], abs=0.02) and shares[0] > 0.5
+
+
+def test_a_load_converges_though_the_hip_s_own_inertia_is_unknown():
+    runs = motions()
+    terms = chosen(["load_dependent_friction@knee"], runs[0].machine, runs)
+    (remark,) = identify(runs, extension=Extension().with_terms(terms)).remarks
+    assert remark.startswith("The torque of the hip was not measured")
 
 
 def test_a_torque_that_is_in_the_file_is_ignored_at_such_a_joint():

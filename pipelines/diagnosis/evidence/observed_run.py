@@ -10,7 +10,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from pipelines.estimation.regression import away_from_reversals, away_from_turns, block_average
+from pipelines.estimation.regression import (
+    away_from_reversals,
+    away_from_turns,
+    block_average,
+    with_rest,
+)
 from pipelines.mechanics.motion import Motion
 from pipelines.mechanics.slow_motion import filtered, unsure
 from pipelines.signals.blocks import BlockAverage
@@ -152,6 +157,7 @@ def observe(motion: Motion, cutoff_hz: float | None = None) -> Run:
     Run
         m blocks of 2 J outputs: drives, then cuffs.
     """
+    motion = with_rest(motion)
     block = block_average(motion)
     starts = block.starts(motion.segment)
     time = block.mean(motion.time, starts)
