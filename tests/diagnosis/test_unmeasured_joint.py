@@ -16,6 +16,7 @@ from pipelines.mechanics.kinematics import motion_table
 from pipelines.mechanics.motion import motion_from_table
 from pipelines.settings.filter import FilterSettings
 from tests.diagnosis.sessions import session
+from tests.identification.test_unmeasured_joint import COUNT
 from tests.identification.test_unmeasured_joint import motions as braked
 
 pytest.importorskip("mujoco")
@@ -113,7 +114,7 @@ def test_the_motion_shows_a_shift_of_the_elbow_and_no_spring_there(plain):
     assert not np.isfinite(found["parallel_spring@elbow"])
 
 
-@pytest.mark.parametrize("counts", [False, True], ids=["still", "flickering encoder"])
+@pytest.mark.parametrize("counts", [0.0, COUNT], ids=["still", "flickering encoder"])
 def test_nothing_is_missing_of_a_knee_below_a_hip_that_rests_at_another_angle_in_each_run(counts):
     found = diagnose(braked(counts=counts))
     assert found.status == "nothing_missing"
@@ -123,7 +124,7 @@ def test_nothing_is_missing_of_a_knee_below_a_hip_that_rests_at_another_angle_in
 
 def test_the_flicker_of_a_held_joint_s_encoder_is_no_rotor_inertia_of_the_other():
     """With the hip's noise in its columns, the links' inertia would fit worse than a rotor's."""
-    found = diagnose(braked(cutoff_hz=12.5, counts=True))
+    found = diagnose(braked(cutoff_hz=12.5, counts=COUNT))
     assert (found.status, found.data.noisy_angles) == ("nothing_missing", False)
 
 

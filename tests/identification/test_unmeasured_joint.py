@@ -21,6 +21,8 @@ from pipelines.settings.filter import FilterSettings
 X2, X3, COULOMB, VISCOUS, GRAVITY = 0.25, 0.8, 1.5, 0.6, 9.81
 KNEE = [X2, X3, COULOMB, VISCOUS]
 RATE_HZ = 200.0
+COUNT = 2.0 * np.pi / 4096
+"""Of an encoder of 12 bits, rad."""
 
 
 def swing(seed):
@@ -36,15 +38,14 @@ def swing(seed):
     return time, q, dq, ddq
 
 
-def braked_leg(purpose, seed, hip_rad, hip_torque=None, gravity=GRAVITY, counts=False):
+def braked_leg(purpose, seed, hip_rad, hip_torque=None, gravity=GRAVITY, counts=0.0):
     """Return a recording of a leg whose hip is held by a brake: a pendulum about its knee."""
     draw = np.random.default_rng(1000 + seed)
     time, q, dq, ddq = swing(seed)
     torque = X2 * ddq + gravity * X3 * np.sin(hip_rad + q) + COULOMB * np.sign(dq) + VISCOUS * dq
     hip = np.full(len(time), hip_rad)
-    if counts:
-        # The encoder flickers between two counts.
-        hip += 4e-4 * draw.integers(0, 2, len(time))
+    # The encoder flickers between two counts, rad.
+    hip += counts * draw.integers(0, 2, len(time))
     frame = pd.DataFrame(
         {
             "time_s": time,
@@ -99,7 +100,7 @@ def with_joints(runs, *joints):
     return [replace(run, metadata=run.metadata | {"joints": list(joints)}) for run in runs]
 
 
-@pytest.mark.parametrize("counts", [False, True], ids=["still", "flickering encoder"])
+@pytest.mark.parametrize("counts", [0.0, COUNT], ids=["still", "flickering encoder"])
 def test_the_knee_is_identified_though_a_brake_holds_the_hip_at_other_angles(counts):
     found = identify(motions(counts=counts))
     assert np.allclose(found.parameters["value"], KNEE, rtol=0.02)
@@ -111,7 +112,7 @@ def test_the_knee_is_identified_though_a_brake_holds_the_hip_at_other_angles(cou
 
 def test_without_gravity_a_flickering_encoder_gives_no_coupling_of_the_links():
     """The knee's equation then has X3 only by the hip's velocity, which is noise alone."""
-    found = identify(motions(gravity=0.0, counts=True))
+    found = identify(motions(gravity=0.0, counts=COUNT))
     assert list(found.parameters["name"]) == ["X2", "coulomb", "viscous"]
     assert np.allclose(found.parameters["value"], [X2, COULOMB, VISCOUS], rtol=0.02)
 
@@ -124,7 +125,7 @@ def test_the_hip_shows_the_coupling_where_the_knee_rests_at_another_angle_in_eac
 
 
 def test_a_flickering_encoder_of_a_held_joint_shows_no_turns():
-    still, flickering = motions()[0], motions(counts=True)[0]
+    still, flickering = motions()[0], motions(counts=COUNT)[0]
     shares = [away_from_turns(motion).mean() for motion in (still, flickering)]
     assert shares[1] == pytest.approx(shares[0], abs=0.02) and shares[0] > 0.5
 
