@@ -76,7 +76,7 @@ class Diagnosis:
         fitted, validate = judged.scheme.runs, before.runs
         imperfect = imperfection(fitted, baseline, before.fit.values)
         known = uncertainty(after.fit, fitted, baseline, imperfect)
-        parameters, covariance = parameter_rows.parameters(after.fit, baseline, known, fitted)
+        parameters, covariance = parameter_rows.parameters(after.fit, baseline, known)
         drift = simulation_error(before.fit, validate, baseline)
         # Without named causes both models are the same.
         after_drift = drift if after is before else simulation_error(after.fit, validate, baseline)

@@ -15,7 +15,7 @@ from pipelines.identification import identify
 from pipelines.mechanics.kinematics import motion_table
 from pipelines.mechanics.motion import motion_from_table
 from pipelines.settings.filter import FilterSettings
-from tests.diagnosis.sessions import session
+from tests.diagnosis.sessions import diagnosed, session
 from tests.identification.test_unmeasured_joint import COUNT
 from tests.identification.test_unmeasured_joint import motions as braked
 
@@ -128,12 +128,31 @@ def test_the_flicker_of_a_held_joint_s_encoder_is_no_rotor_inertia_of_the_other(
     assert (found.status, found.data.noisy_angles) == ("nothing_missing", False)
 
 
-def test_a_shifted_encoder_of_the_knee_shows_in_the_hip_s_torque_alone():
-    joints = [{"name": "hip"}, {"name": "knee", "drive": "unmeasured"}]
-    runs = [
-        replace(m, torque=m.torque * [1.0, 0.0], metadata=m.metadata | {"joints": joints})
-        for m in session("encoder_offset", "knee", offset=0.05)
+def leg_without_torque_of(joint, *effect, **values):
+    """Return the runs of a leg, alone and with a wearer, without one joint's torque."""
+    names = ("hip", "knee")
+    joints = [{"name": n} | ({"drive": "unmeasured"} if n == joint else {}) for n in names]
+    known = [float(name != joint) for name in names]
+    return [
+        replace(m, torque=m.torque * known, metadata=m.metadata | {"joints": joints})
+        for m in session(*effect, **values)
     ]
+
+
+def test_cuffs_show_the_whole_leg_of_the_wearer_without_the_hip_s_torque():
+    table = diagnose(leg_without_torque_of("hip")).parameters
+    bodies = table[table["effect"] == "rigid_body"]
+    by_run = {run: list(rows["name"]) for run, rows in bodies.groupby("run")}
+    assert by_run["exo_alone"] == by_run["with_human"] == ["X2", "X3"]
+    assert by_run["human"] == ["X1", "X2", "X3", "X4"]
+    whole = diagnosed().parameters
+    of_wearer = whole.loc[whole["run"] == "human", "value"].to_numpy()
+    own = bodies[bodies["run"] == "human"]
+    assert np.all(np.abs(own["value"] - of_wearer) < 2.0 * own["std_error"])
+
+
+def test_a_shifted_encoder_of_the_knee_shows_in_the_hip_s_torque_alone():
+    runs = leg_without_torque_of("knee", "encoder_offset", "knee", offset=0.05)
     outcome = verdict(diagnose(runs))
     (cause,) = outcome["causes"]
     assert (cause["effect"], cause["joint"]) == ("encoder_offset", "knee")

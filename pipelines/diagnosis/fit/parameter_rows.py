@@ -17,12 +17,9 @@ from pipelines.effects import RUNS
 from pipelines.effects.baseline import ForceSensorZero, RigidBody
 from pipelines.estimation.parameter_table import Row, interval, rows_of, table_of
 from pipelines.estimation.sandwich import sandwich
-from pipelines.estimation.undetermined import undetermined
 
 
-def parameters(
-    fit: Fit, baseline: Baseline, sure: Uncertainty, runs: Sequence[Run] = ()
-) -> tuple[pd.DataFrame, NDArray]:
+def parameters(fit: Fit, baseline: Baseline, sure: Uncertainty) -> tuple[pd.DataFrame, NDArray]:
     """Return ``parameters/1`` of a fit, and the covariance of its rows.
 
     There is a rigid body for each kind of run, and the human's. Inertial parameters that nothing
@@ -34,8 +31,6 @@ def parameters(
     baseline : Baseline
     sure : Uncertainty
         Of the fit.
-    runs : sequence of Run, optional
-        The fitted runs; without them all parameters count as determined.
 
     Returns
     -------
@@ -48,7 +43,8 @@ def parameters(
     units = np.eye(len(sure.covariance))
     values = np.append(fit.values, np.zeros(len(units) - len(fit.values)))
     rows: list[Row] = []
-    unknown = np.flatnonzero(undetermined(baseline.layout, [run.motion for run in runs]))
+    # Their columns are zero at every output that was measured.
+    unknown = np.flatnonzero(np.diag(sure.normal) == 0.0)
     for run, bodies in _bodies(baseline).items():
         slopes = units[bodies].sum(axis=0)
         body = RigidBody(run=run, on=baseline.machine)
