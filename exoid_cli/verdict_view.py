@@ -136,7 +136,7 @@ def _show_errors(verdict: "Verdict", joints: "Sequence[Joint]") -> None:
     if not verdict.causes:
         del errors["extended_rmse_nm"]
     headings, rows = ["joint", *errors.values()], []
-    for joint in joints:
+    for joint in (joint for joint in joints if joint.is_measured):
         numbers = [f"{getattr(verdict, key)[joint.name]:{digits}}" for key in errors]
         rows.append([joint.name, *numbers])
     if verdict.causes:

@@ -9,7 +9,7 @@ from functools import cache
 from typing import Literal, NamedTuple
 
 Kind = Literal["revolute", "prismatic"]
-Drive = Literal["measured", "none"]
+Drive = Literal["measured", "none", "unmeasured"]
 
 
 class Unit(NamedTuple):

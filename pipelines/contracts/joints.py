@@ -43,7 +43,8 @@ class Joint:
     name: str
     kind: Kind = "revolute"
     drive: Drive = "measured"
-    """``none`` for a passive joint, whose torque is zero."""
+    """``none`` for a passive joint, whose torque is zero; ``unmeasured`` where it was not recorded,
+    so that only the motion is known."""
     turns: bool = False
     """True for a joint that turns without end."""
 
@@ -59,13 +60,24 @@ class Joint:
 
     def __str__(self) -> str:
         """Return its name and what it is, for messages."""
-        passive, endless = ", no drive" * self.is_passive, ", turns without end" * self.turns
-        return f"{self.name} ({self.kind}{passive}{endless})"
+        drive = {"none": ", no drive", "unmeasured": ", torque not measured"}.get(self.drive, "")
+        endless = ", turns without end" * self.turns
+        return f"{self.name} ({self.kind}{drive}{endless})"
 
     @property
     def is_passive(self) -> bool:
         """Whether it has no drive: its torque is zero, and no measurement."""
         return self.drive == "none"
+
+    @property
+    def is_measured(self) -> bool:
+        """Whether its torque is known, measured or zero: only then is its equation used."""
+        return self.drive != "unmeasured"
+
+    @property
+    def has_sensor(self) -> bool:
+        """Whether its torque is a reading."""
+        return self.drive == "measured"
 
     def column(self, quantity: str) -> str:
         """Return a quantity's column: of ``"angle"``, ``hip_angle_rad`` or ``axis_position_m``."""
@@ -89,6 +101,9 @@ class Joint:
         """The word for the action of its drive."""
         return "torque" if self.kind == "revolute" else "force"
 
+
+AT_REST = 'for a joint that rests set drive = "unmeasured" if its angle matters, or leave it out'
+"""What to do about a joint that rests in all runs."""
 
 HIP_AND_KNEE = (Joint("hip"), Joint("knee"))
 

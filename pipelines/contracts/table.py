@@ -39,12 +39,19 @@ class Column:
     turns: bool = False
     """Whether an angle has no limit, because its joint turns without end."""
 
+    @property
+    def needs_torque(self) -> bool:
+        """Whether it is missing at a joint whose torque was not measured."""
+        return self.name in ("torque", "torque_measured", "predicted", "residual")
+
     def at(self, joint: Joint, is_level: bool) -> "Column":
         """Return this quantity's column at one joint of a machine, with gravity or level."""
         name, unit = joint.column(self.name), joint.unit(self.name)
         # Without gravity most torques do not depend on the turn, and no metadata need allow it.
         turns = joint.turns or is_level
-        return replace(self, name=name, unit=unit, per_joint=False, turns=turns)
+        # A torque that was not measured is missing, and so is all that is compared with it.
+        nullable = self.nullable or (self.needs_torque and not joint.is_measured)
+        return replace(self, name=name, unit=unit, per_joint=False, turns=turns, nullable=nullable)
 
 
 def per_joint(

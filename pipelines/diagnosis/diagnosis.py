@@ -154,8 +154,9 @@ class Diagnosis:
 
     @property
     def floor_rms(self) -> NDArray:
-        """(J,) N·m noise floor of the drives."""
-        return self.floor.rms[: len(self.baseline.joints)]
+        """(J,) N·m noise floor of the drives; infinite where the torque was not measured."""
+        measured = self.baseline.machine.measured
+        return np.where(measured, self.floor.rms[: len(measured)], np.inf)
 
     @property
     def unexplained(self) -> list[float | None]:
@@ -261,6 +262,9 @@ class Diagnosis:
         table = self.parameters.reset_index(drop=True)
         geometry = self.fitted_runs[0].motion.geometry
         for _, rows in table[table["effect"] == RigidBody.name].groupby("run"):
+            # A body of which a part is not determined cannot be judged.
+            if len(rows) < len(self.baseline.machine.mechanism.parameters):
+                continue
             own = rows.index.to_numpy()
             # Delta method: ``slope`` carries the parameters' covariance to the least inertia.
             least, _, slope = self.baseline.machine.mechanism.least_inertia(rows["value"], geometry)

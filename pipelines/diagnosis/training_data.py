@@ -160,7 +160,7 @@ def _refuse_unknown_noise(validate: Sequence[Run], faults: Sequence[Fault]) -> N
     # The torque stands for the residual here: only whether blocks suffice matters.
     floor = noise_floor(validate, [run.measured for run in validate]).rms[: len(joints)]
     for j, joint in enumerate(joints):
-        if not np.isfinite(floor[j]):
+        if validate[0].motion.machine.measured[j] and not np.isfinite(floor[j]):
             usable = sum(int(run.usable[:, j].sum()) for run in validate)
             files = [run.motion.file for run in validate]
             # The fault that leaves most samples out comes first.

@@ -53,8 +53,10 @@ def make_plant(model: Model, geometry: Geometry, joints: tuple[Joint, ...], run:
     Raises
     ------
     InputError
-        If no real machine has its parameters.
+        If no real machine has its parameters, or a torque was not measured.
     """
+    if not all(joint.is_measured for joint in joints):
+        machine_of(joints, geometry).refuse_unmeasured("the model", "A simulation")
     model = model.for_run(run)
     assembly = assemble(model, geometry, [joint.name for joint in joints])
     lightest = _lightest(assembly)
@@ -114,6 +116,7 @@ def plant_from_table(
         )
     joints, geometry = joints_of(table.metadata), geometry_of(table.metadata, default_geometry)
     machine = machine_of(joints, geometry, table.path)
+    machine.refuse_unmeasured(table.path, "A simulation")
     model, guesses = with_own_values(
         model_from_parameters(table.frame, run, machine).for_run(run), table, recording
     )

@@ -72,8 +72,9 @@ def replay(
     Raises
     ------
     InputError
-        If no stretch of valid samples is as long as a window.
+        If no stretch of valid samples is as long as a window, or a torque was not measured.
     """
+    motion.machine.refuse_unmeasured(motion.file or "the motion", "A simulation")
     longest_step_s = 0.0025
     length = round(window_s * motion.sample_rate_hz)
     every = max(1, round(every_s * motion.sample_rate_hz))

@@ -380,7 +380,8 @@ class Effect(ABC):
     @classmethod
     def _fits(cls, joint: Joint) -> bool:
         """Return whether a joint with such a drive and travel can have it."""
-        return not ((cls.needs_torque and joint.is_passive) or (cls.limits_travel and joint.turns))
+        lacks_torque = cls.needs_torque and not joint.has_sensor
+        return not (lacks_torque or (cls.limits_travel and joint.turns))
 
     @property
     def scale(self) -> Scale:

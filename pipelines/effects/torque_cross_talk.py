@@ -29,10 +29,9 @@ class TorqueCrossTalk(Effect):
     @classmethod
     def possible(cls, machine: Machine) -> list[str | None]:
         """Return the joints of a machine with two drives of one kind; empty for other machines."""
-        # Between a torque and a force, the share would have a unit. A passive joint has no torque
-        # to share.
-        drives = [joint.kind for joint in machine.joints if not joint.is_passive]
-        two_alike = len(machine.joints) == len(drives) == 2 and drives[0] == drives[1]
+        # Between a torque and a force, the share would have a unit. Both torques must be readings.
+        kinds = [joint.kind for joint in machine.joints if joint.has_sensor]
+        two_alike = len(machine.joints) == len(kinds) == 2 and kinds[0] == kinds[1]
         return super().possible(machine) if two_alike else []
 
     def directions(self, motions: Sequence[Motion]) -> tuple[tuple[tuple[float, ...], ...], ...]:

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from pipelines.estimation.long_run import Scores, long_run_covariance
 from pipelines.estimation.problem import Problem
 from pipelines.estimation.sandwich import sandwich
+from pipelines.mechanics.machine import Machine
 
 
 @dataclass(frozen=True)
@@ -60,6 +61,20 @@ class Estimator(ABC):
     """Name in sentences."""
     masks: ClassVar[bool] = True
     """Whether samples near reversals are left out by default."""
+
+    needs_every_torque: ClassVar[bool] = False
+    """Whether it simulates the machine, or constrains all of its bodies."""
+
+    def refuse_unmeasured(self, machine: Machine) -> None:
+        """Refuse a machine with a joint whose torque was not measured, if the method needs it.
+
+        Raises
+        ------
+        InputError
+            Names the joints.
+        """
+        if self.needs_every_torque:
+            machine.refuse_unmeasured(f"--method {self.name}", "This method")
 
     @abstractmethod
     def fit(self, problem: Problem) -> Fit:

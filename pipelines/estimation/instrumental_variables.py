@@ -31,6 +31,7 @@ class InstrumentalVariables(Estimator):
     name = "instrumental_variables"
     short = "iv"
     title = "instrumental variables (IDIM-IV)"
+    needs_every_torque = True
 
     def fit(self, problem: Problem) -> Fit:
         """Fit all runs at once, beginning with least squares.

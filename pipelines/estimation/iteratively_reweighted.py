@@ -87,8 +87,8 @@ class IterativelyReweighted(Estimator):
         Returns
         -------
         Fit
-            ``about`` holds ``iterations``, ``settled``, ``scale_nm`` (J values, N·m) and
-            ``rejected_share`` by joint.
+            ``about`` holds ``iterations``, ``settled``, ``scale_nm`` (N·m, of each measured
+            joint) and ``rejected_share`` by joint.
         """
         start = WeightedLeastSquares().fit(problem)
         # The root of the inverse weights is the rms residual of each joint: a first scale.
@@ -103,8 +103,9 @@ class IterativelyReweighted(Estimator):
         # A score's derivative has the loss's slope, which is less than the weight of a large
         # residual. With weights instead, intervals come out too narrow.
         sensitivity = inverse(sums.slope[free], problem.names)
-        joints = problem.runs[0][1].joints
-        shares = dict(zip(joints, sums.rejected.tolist(), strict=True))
+        machine = problem.runs[0][1].machine
+        rejected = sums.rejected[machine.measured].tolist()
+        shares = dict(zip(machine.measured_names, rejected, strict=True))
         return Fit(
             values,
             sums.normal[free],
@@ -115,7 +116,7 @@ class IterativelyReweighted(Estimator):
             {
                 "iterations": first.iterations + second.iterations,
                 "settled": settled,
-                "scale_nm": scale.tolist(),
+                "scale_nm": scale[machine.measured].tolist(),
                 "rejected_share": shares,
             },
             convergence_remark(settled, f"{most} iterations") + _of_outliers(shares),
@@ -184,7 +185,8 @@ def _sums(problem: Problem, values: NDArray, scale: NDArray, loss: Loss) -> Sums
         # A median needs all residuals at once, so sizes are kept and sums are not enough.
         for j, size in enumerate(sizes):
             size.append(np.abs(residual[r.usable[:, j], j]))
-    residuals = [np.concatenate(size) for size in sizes]
+    # A joint whose torque was not measured has no residuals.
+    residuals = [np.concatenate([*size, [0.0] * (not any(map(len, size)))]) for size in sizes]
     return Sums(
         normal,
         slope,

@@ -41,7 +41,8 @@ class WeightedLeastSquares(Estimator):
         Returns
         -------
         Fit
-            ``about`` holds ``joint_weights_1_nm2``: J inverse variances, 1/(N·m)².
+            ``about`` holds ``joint_weights_1_nm2``: an inverse variance of each joint that has
+            rows, 1/(N·m)².
         """
         rows, held = problem.rows, problem.of_held
         # Held parameters act through their torque alone: friction, in the step of the wearer.
@@ -63,7 +64,7 @@ class WeightedLeastSquares(Estimator):
             carry_of(problem, sensitivity, slope),
             weights,
             partial(_scores, problem, values, weights),
-            {"joint_weights_1_nm2": weights.tolist()},
+            {"joint_weights_1_nm2": weights[rows.count > 0].tolist()},
         )
 
     def _weights(self, rows: CompressedRows, names: list[str]) -> NDArray:

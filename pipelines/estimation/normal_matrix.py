@@ -5,6 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from pipelines.contracts.joints import AT_REST
 from pipelines.errors import NotIdentifiable
 
 
@@ -34,7 +35,7 @@ def inverse(gram: NDArray, names: Sequence[str]) -> NDArray:
         silent = [name for name, s in zip(names, size, strict=True) if s == 0]
         raise NotIdentifiable(
             f"the motion does not excite {', '.join(silent)}: their columns are zero at every"
-            " usable sample. Move every joint in both directions, faster than it sticks"
+            f" usable sample. Move every joint in both directions, faster than it sticks; {AT_REST}"
         )
     # Parameters have different units, so only unit columns have a meaningful condition number.
     scaled = gram / np.outer(size, size)
@@ -46,7 +47,6 @@ def inverse(gram: NDArray, names: Sequence[str]) -> NDArray:
         mixed = [names[i] for i in np.argsort(-weight) if weight[i] > 0.3 * weight.max()]
         raise NotIdentifiable(
             f"the motion does not separate {' and '.join(mixed)}: any of them can stand for the"
-            " others. Excite more harmonics, move all joints at once, leave out a joint at rest, or"
-            " record longer"
+            f" others. Excite more harmonics, move all joints at once, or record longer; {AT_REST}"
         )
     return np.linalg.inv(scaled) / np.outer(size, size)

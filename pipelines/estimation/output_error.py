@@ -33,6 +33,7 @@ class OutputError(Estimator):
     short = "oe"
     title = "output error"
     masks = False
+    needs_every_torque = True
 
     def fit(self, problem: Problem) -> Fit:
         """Fit all runs at once, beginning with the realizable least-squares model.

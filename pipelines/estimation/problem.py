@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from pipelines.estimation.compressed import CompressedRows, compress, together
 from pipelines.estimation.regression import Regression, regressions
+from pipelines.estimation.undetermined import undetermined
 from pipelines.mechanics.run import Run, kinds_of
 from pipelines.mechanics.silence import silent_torque
 from pipelines.model import Model, ParameterLayout, Term
@@ -51,6 +52,11 @@ class Training:
         ]
         effects = [term.effect for term in self.model]
         return ParameterLayout.of(effects, [run.run for run in self.runs], absent)
+
+    @cached_property
+    def undetermined(self) -> NDArray:
+        """(p,) bool: columns that are zero wherever a torque is known; they are not fitted."""
+        return undetermined(self.layout, self.runs)
 
     def _terms_of(self, run: Run) -> tuple[Term | None, ...]:
         """Return the model's terms in a run; None for a term that is absent."""
@@ -163,7 +169,7 @@ class Training:
             r = replace(r, regressor=self.layout.expand(r.regressor, number, present))
             if self.reversals:
                 # A sample is valid at all joints or none; only reversals are each joint's own.
-                r = replace(r, usable=np.repeat(r.valid[:, np.newaxis], r.torque.shape[1], 1))
+                r = replace(r, usable=r.valid[:, np.newaxis] & r.measured)
             yield self._free_of_scale(r, run)
 
     def _free_of_scale(self, r: Regression, run: Run) -> Regression:

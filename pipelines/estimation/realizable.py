@@ -30,6 +30,7 @@ class Realizable(Estimator):
 
     name = "realizable"
     title = "physically realizable least squares"
+    needs_every_torque = True
 
     def fit(self, problem: Problem) -> Fit:
         """Fit all runs at once, then find the nearest model that can exist.

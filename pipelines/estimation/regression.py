@@ -34,14 +34,17 @@ class Regression:
     valid: NDArray
     """(m,) bool: whether every sample of the block is valid."""
     usable: NDArray
-    """(m, J) bool: whether the block is valid and away from that joint's reversals."""
+    """(m, J) bool: whether the block is valid and away from that joint's reversals; false at a
+    joint whose torque was not measured."""
     state: tuple[NDArray, NDArray, NDArray]
     """q, dq, ddq, (m, J) each; rad, rad/s, rad/s²."""
+    measured: NDArray
+    """(J,) bool: joints whose torque is known."""
 
     @property
     def scored(self) -> NDArray:
-        """(m,) bool: whether the block is usable at every joint, as the RMSE counts it."""
-        return np.asarray(self.usable.all(axis=1))
+        """(m,) bool: whether the block is usable at every measured joint, as the RMSE counts it."""
+        return np.asarray(self.usable[:, self.measured].all(axis=1))
 
 
 def residual_of(r: Regression, values: NDArray) -> NDArray:
@@ -116,13 +119,14 @@ def reversal_speeds(machine: Machine) -> NDArray:
 
 def mask_in_words(machine: Machine) -> str:
     """Describe the samples that are left out for being near a reversal."""
-    speeds = reversal_speeds(machine)
-    units = [joint.unit("velocity") for joint in machine.joints]
+    # No equation of the other joints is used.
+    speeds, names = reversal_speeds(machine)[machine.measured], machine.measured_names
+    units = [machine.joint(name).unit("velocity") for name in names]
     parts = [f"{v:.2g} {unit}" for v, unit in zip(speeds, units, strict=True)]
     alike = (
         parts[:1]
         if len(set(parts)) == 1
-        else [f"{s} ({name})" for s, name in zip(parts, machine.names, strict=True)]
+        else [f"{s} ({name})" for s, name in zip(parts, names, strict=True)]
     )
     return f"|v| < {', '.join(alike)}, padded {REVERSAL_PADDING_S:g} s"
 
@@ -168,7 +172,42 @@ def away_from_turns(motion: Motion) -> NDArray:
     """
     # Within 75 ms of a turn measured forces and filtered acceleration are not simultaneous.
     reach = round(0.075 * motion.sample_rate_hz)
-    return np.asarray(~dilate(np.any(turns(motion), axis=1), reach))
+    return np.asarray(~dilate(np.any(turns(with_rest(motion)), axis=1), reach))
+
+
+def with_rest(motion: Motion) -> Motion:
+    """Return the motion without the velocity of joints that rest throughout (``at_rest``).
+
+    Noise of the encoder of a joint that is held would be an acceleration, which no torque has.
+
+    Parameters
+    ----------
+    motion : Motion
+        n samples of J joints.
+    """
+    # Most machines have every torque, and nothing to look for.
+    if motion.machine.measured.all():
+        return motion
+    rests = at_rest(motion)
+    dq, ddq = (np.where(rests, 0.0, x) for x in (motion.dq, motion.ddq))
+    return motion.with_state(motion.q, dq, ddq)
+
+
+def at_rest(motion: Motion) -> NDArray:
+    """Return which joints rest throughout, of those whose torque was not measured.
+
+    Parameters
+    ----------
+    motion : Motion
+        n samples of J joints.
+
+    Returns
+    -------
+    (J,) bool array
+        False at a measured joint, which must move.
+    """
+    moves = np.any(away_from_reversals(motion) & motion.valid[:, np.newaxis], axis=0)
+    return np.asarray(~moves & ~motion.machine.measured)
 
 
 def turns(motion: Motion) -> NDArray:
@@ -232,7 +271,7 @@ def regress(piece: Piece, model: Model, cutoff_hz: float | None = None) -> Regre
     Regression
         m block means: regressor (m, J, p), N·m per unit; torque (m, J), N·m.
     """
-    motion, core = piece.motion, piece.core
+    motion, core = with_rest(piece.motion), piece.core
     block = block_average(motion)
     starts = block.starts(motion.segment, piece.before)
     starts = starts[(starts >= core.start) & (starts < core.stop)]
@@ -243,17 +282,18 @@ def regress(piece: Piece, model: Model, cutoff_hz: float | None = None) -> Regre
             filtered(motion, np.nan_to_num(x), cutoff_hz) for x in (regressor, torque)
         )
         trusted = trusted & ~unsure(motion, cutoff_hz)
-    valid = block.all(trusted, starts)
+    valid, measured = block.all(trusted, starts), motion.machine.measured
     return Regression(
         time=block.mean(motion.time, starts),
         segment=motion.segment[starts],
         regressor=block.mean(regressor, starts),
         torque=block.mean(torque, starts),
         valid=valid,
-        usable=valid[:, np.newaxis] & block.all(away_from_reversals(motion), starts),
+        usable=valid[:, np.newaxis] & measured & block.all(away_from_reversals(motion), starts),
         state=(
             block.mean(motion.q, starts),
             block.mean(motion.dq, starts),
             block.mean(motion.ddq, starts),
         ),
+        measured=measured,
     )

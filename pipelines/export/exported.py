@@ -169,6 +169,7 @@ def exported(
     run = run or (bodies.copy().pop() if len(bodies) == 1 else "with_human")
     geometry = geometry_of(table.metadata, default_geometry)
     machine = machine_of(joints_of(table.metadata), geometry, table.path)
+    machine.refuse_unmeasured(table.path, "An export")
     with about(table.path):
         if run not in bodies:
             raise InputError(

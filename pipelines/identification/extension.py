@@ -185,7 +185,9 @@ def named(table: Table, runs: Sequence[Run], recordings: Sequence[Path]) -> Exte
             in_run = [term for term in terms if term.effect.acts(run.run)]
             remarks += _remarks(run, path, in_run, table, sha256)
     shapes, unique = _of_shapes(table, acting), tuple(dict.fromkeys(remarks))
-    return Extension(terms, shapes, _critical(table), own, _bodies(table), hashes, unique)
+    return Extension(
+        terms, shapes, _critical(table), own, _bodies(table, runs[0].machine), hashes, unique
+    )
 
 
 def _refuse_another_machine(table: Table, run: Run) -> None:
@@ -256,10 +258,11 @@ def _critical(table: Table) -> float:
     return float(width) if np.isfinite(width) else 1.96
 
 
-def _bodies(table: Table) -> dict[str, NDArray]:
+def _bodies(table: Table, machine: Machine) -> dict[str, NDArray]:
+    """Return the rigid bodies of a table, without those that it does not know completely."""
     frame = table.frame[table.frame["effect"] == RigidBody.name]
     return {
         kind: frame.loc[frame["run"] == kind, "value"].to_numpy(float)
         for kind in (*RUNS, "human")
-        if (frame["run"] == kind).any()
+        if (frame["run"] == kind).sum() == len(machine.mechanism.parameters)
     }

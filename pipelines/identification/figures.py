@@ -65,7 +65,8 @@ def draw(residuals: Rows, folder: Path) -> list[str]:
     list of str
         Names of the PNG files.
     """
-    joints, names = residuals.joints, list[str]()
+    names = list[str]()
+    joints = [joint for joint in residuals.joints if joint.is_measured]
     with plt.rc_context(STYLE):
         for file, run in _validation_runs(residuals).items():
             name = Path(file).stem

@@ -12,7 +12,7 @@ from pipelines.model import BASELINE, Term
 
 
 def rows(training: Training, values: NDArray) -> Iterator[Row]:
-    """Yield the rows of a ``parameters/1`` table.
+    """Return the rows of a ``parameters/1`` table, without those that nothing determines.
 
     Parameters
     ----------
@@ -21,11 +21,16 @@ def rows(training: Training, values: NDArray) -> Iterator[Row]:
     values : (p,) array
         Values of the columns, in their units.
 
-    Yields
-    ------
-    Row
+    Returns
+    -------
+    iterator of Row
         Body alone, friction, body with a person, the person's, then extensions.
     """
+    unknown = np.flatnonzero(training.undetermined)
+    return (row for row in _rows(training, values) if not row.slope[unknown].any())
+
+
+def _rows(training: Training, values: NDArray) -> Iterator[Row]:
     terms = list(_sloped(training, values))
     bodies = [one for one in terms if isinstance(one[0].effect, RigidBody)]
     # The layout has the machine's body first.

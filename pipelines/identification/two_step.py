@@ -30,6 +30,7 @@ from pipelines.identification.extension import Extension, refuse_unread
 from pipelines.identification.parameter_rows import rows
 from pipelines.identification.runs import train_and_validate
 from pipelines.identification.validation import Validation, validate
+from pipelines.mechanics.machine import THE_LEG, Machine
 from pipelines.mechanics.run import Run, kinds_of
 from pipelines.mechanics.scale import on_one_scale
 from pipelines.model import Model, baseline, unrealizable, upside_down
@@ -130,6 +131,7 @@ def identify(
         If the motion cannot separate the parameters.
     """
     estimator, extension = estimator or WeightedLeastSquares(), extension or Extension()
+    estimator.refuse_unmeasured(motions[0].machine if motions else THE_LEG)
     train, judged = train_and_validate(on_one_scale(motions))
     loud = is_loud(train)
     refuse_unread(extension.terms, [*train, *judged])
@@ -153,11 +155,13 @@ def identify(
         f" {CUTOFF_HZ:g}, and check encoder counts and time stamps"
     )
     # One fit of all columns is the check: friction that changes with a wearer shows there.
-    everything = Problem(training, training.kinds, np.arange(len(values)), np.zeros(len(values)))
+    fitted = np.flatnonzero(~training.undetermined)
+    everything = Problem(training, training.kinds, fitted, np.zeros(len(values)))
+    whole = everything.completed(estimator.fit(everything).values)
     return IdentifiedModel(
         parameters=table,
         covariance=covariance,
-        one_step=np.array([row.value for row in rows(training, estimator.fit(everything).values)]),
+        one_step=np.array([row.value for row in rows(training, whole)]),
         validation=validate(judged, partial(_as_model, training, values), training.cutoff_hz),
         runs=(*training.runs, *judged),
         training=training,
@@ -173,11 +177,18 @@ def identify(
         remarks=[
             *(f"{kind}: {remark}" for kind, step in steps.items() for remark in step.fit.remarks),
             *upside_down(table, train[0].machine),
+            *_unmeasured(train[0].machine),
             *extension.remarks,
             *_limits(estimator, training, has_converged),
         ],
         angle_noise=[biased] * (loud and training.cutoff_hz is None),
     )
+
+
+def _unmeasured(machine: Machine) -> list[str]:
+    """Return a remark on joints whose torque was not measured."""
+    words = machine.unmeasured_in_words
+    return [f"{words}. Parameters that do not act on these are left out"] if words else []
 
 
 def _limits(estimator: Estimator, training: Training, has_converged: bool) -> Iterator[str]:
@@ -254,7 +265,8 @@ def _with_consistent_loads(
         )
         fitted_bodies = _bodies(training, _values(_in_steps(training, WeightedLeastSquares())))
         step = np.concatenate([fitted_bodies[kind] for kind in kinds]) - values
-        if np.all(np.abs(step) < tolerance * np.abs(values)):
+        # A parameter that nothing determines stays at zero.
+        if np.all(np.abs(step) <= tolerance * np.abs(values)):
             return training, True
         growth = 0.0
         # If the map has slope g, a step of length l leaves 1 - l (1 - g) of the residual. The ratio
@@ -299,7 +311,8 @@ def _in_steps(training: Training, estimator: Estimator) -> dict[str, Step[Fit]]:
     values = np.zeros(len(empty))
     steps = {}
     for kind in training.kinds:
-        fitted = np.flatnonzero(empty if kind == "exo_alone" else ~empty)
+        acting = empty if kind == "exo_alone" else ~empty
+        fitted = np.flatnonzero(acting & ~training.undetermined)
         problem = Problem(training, (kind,), fitted, values)
         steps[kind] = Step(problem, estimator.fit(problem))
         values = _values(steps)

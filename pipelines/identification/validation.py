@@ -7,7 +7,7 @@ import numpy as np
 import pyarrow as pa
 from numpy.typing import NDArray
 
-from pipelines.contracts.joints import columns_of, joints_of
+from pipelines.contracts.joints import AT_REST, columns_of, joints_of
 from pipelines.errors import InputError
 from pipelines.estimation.regression import Regression, regressions, residual_of
 from pipelines.mechanics.run import Run
@@ -16,7 +16,7 @@ from pipelines.model import Model
 
 @dataclass(frozen=True)
 class Score:
-    """Torque error of one group of runs, every array (J,) N·m."""
+    """Torque error of one group of runs, every array (J,) N·m, of J measured joints."""
 
     rmse: NDArray
     """Away from reversals, as in verdicts."""
@@ -80,7 +80,7 @@ def validate(
     InputError
         If the joints of a kind of run never all move at once.
     """
-    joints = motions[0].joints
+    joints = motions[0].machine.measured_names
     sums: dict[str, NDArray] = {}
     for motion in motions:
         model = model_of(motion)
@@ -104,16 +104,17 @@ def _refuse_unjudged(motions: Sequence[Run], sums: Mapping[str, NDArray]) -> Non
             files = ", ".join(motion.file for motion in motions if motion.run == kind)
             raise InputError(
                 f"{files}: at no time do all joints move away from reversals, so no torque error"
-                f" can be given ({kind}, validate); validate on a run in which all joints move, or"
-                " leave a joint that rests in all runs out of the map"
+                f" can be given ({kind}, validate). Validate on a run in which all joints move;"
+                f" {AT_REST}"
             )
 
 
 def _sums(r: Regression, residual: NDArray) -> NDArray:
     """Return sums of squares and their numbers of blocks, (5, J), as ``_score`` takes them."""
-    squares, ones = residual**2, np.ones_like(residual)
+    squares, torques = (x[:, r.measured] ** 2 for x in (residual, r.torque))
+    ones = np.ones_like(squares)
     # All joints count on the same blocks, so that their errors are comparable.
-    scored = [x[r.scored].sum(axis=0) for x in (squares, r.torque**2, ones)]
+    scored = [x[r.scored].sum(axis=0) for x in (squares, torques, ones)]
     return np.array([*scored, *(x[r.valid].sum(axis=0) for x in (squares, ones))])
 
 
@@ -167,8 +168,8 @@ def _residual_rows(r: Regression, motion: Run, model: Model, name: str) -> pa.Ta
         "angle": r.state[0],
         "velocity": r.state[1],
         "acceleration": r.state[2],
-        "torque": r.torque,
-        "predicted": r.torque - error,
-        "residual": error,
+        "torque": np.where(r.measured, r.torque, np.nan),
+        "predicted": np.where(r.measured, r.torque - error, np.nan),
+        "residual": np.where(r.measured, error, np.nan),
     }
     return pa.table(columns | columns_of(joints_of(motion.metadata), quantities))

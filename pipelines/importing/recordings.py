@@ -151,11 +151,11 @@ def _recordings_of(
     note = noting("time", findings)
     _note_sampling(sampling, note)
     columns = {"time_s": time} | {name: values[whole] for name, values in columns.items()}
-    # The torque of a joint without a drive is known to be zero.
+    # The torque of a joint without a drive is known to be zero; one that was not recorded is not.
     columns |= {
-        joint.joint.column("torque"): np.zeros(len(time))
+        joint.joint.column("torque"): np.full(len(time), 0.0 if joint.joint.is_passive else np.nan)
         for joint in settings.joint
-        if joint.joint.is_passive
+        if not joint.joint.has_sensor
     }
     _check_values(columns, settings)
     _check_periods(wanted, float(run.time_s[-1]))

@@ -1,14 +1,18 @@
 """A machine: a mechanism whose joints have names and scales."""
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cached_property
 from importlib import import_module
 from itertools import combinations
 from pkgutil import iter_modules
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from pipelines.contracts.joint_units import Scale
-from pipelines.contracts.joints import HIP_AND_KNEE, Joint, in_words
+from pipelines.contracts.joints import HIP_AND_KNEE, Joint, in_words, the
 from pipelines.errors import InputError
 from pipelines.mechanics import mechanisms
 from pipelines.mechanics.geometry import Geometry
@@ -64,6 +68,48 @@ class Machine:
         """Names of its joints."""
         return tuple(joint.name for joint in self.joints)
 
+    @cached_property
+    def measured(self) -> NDArray:
+        """(J,) bool: joints whose torque is known. The motion of the others is a known input."""
+        return np.array([joint.is_measured for joint in self.joints])
+
+    @property
+    def measured_names(self) -> tuple[str, ...]:
+        """Names of the joints whose torque is known."""
+        return tuple(joint.name for joint in self.joints if joint.is_measured)
+
+    @property
+    def unmeasured_in_words(self) -> str:
+        """Words about the joints whose torque was not measured; empty if there are none."""
+        names = [the(joint.name) for joint in self.joints if not joint.is_measured]
+        if not names:
+            return ""
+        inputs = (
+            "its motion is a known input" if len(names) == 1 else "their motions are known inputs"
+        )
+        return f"The torque of {' and '.join(names)} was not measured: {inputs} of the other joints"
+
+    def refuse_unmeasured(self, source: Any, use: str) -> None:
+        """Refuse a machine with a joint whose torque was not measured.
+
+        Parameters
+        ----------
+        source : Path or str
+            Begin of the message.
+        use : str
+            What needs every torque, as the begin of a sentence.
+
+        Raises
+        ------
+        InputError
+            Names the joints.
+        """
+        if self.unmeasured_in_words:
+            raise InputError(
+                f"{source}: {self.unmeasured_in_words}. {use} needs a machine whose joints all have"
+                ' a measured torque or drive = "none"'
+            )
+
     @property
     def joint_metadata(self) -> list[dict[str, Any]]:
         """Its joints for a file's metadata."""
@@ -110,14 +156,21 @@ class Machine:
     def absorbs(self) -> Mapping[str, str]:
         """Kinds of torque that the parameters absorb completely, as ``Mechanism.absorbs``."""
         # The only drive fixes the scale of all parameters, so a gain of its torque does not show.
-        one_drive = sum(not joint.is_passive for joint in self.joints) == 1
+        one_drive = sum(joint.has_sensor for joint in self.joints) == 1
         gain = {"gain": "all parameters together"} if one_drive else {}
         return {**self.mechanism.absorbs, **gain}
 
     @property
     def is_exoskeleton(self) -> bool:
         """Whether it is the leg of the standard ranges and thresholds, by its joints' names."""
-        return self.joints == HIP_AND_KNEE
+        # It is no other leg where a torque was not recorded.
+        return (
+            tuple(
+                joint if joint.is_measured else replace(joint, drive="measured")
+                for joint in self.joints
+            )
+            == HIP_AND_KNEE
+        )
 
 
 THE_LEG = Machine()
@@ -144,7 +197,7 @@ def machine_of(
     InputError
         If no mechanism has such joints, or none of them a measured torque.
     """
-    if all(joint.is_passive for joint in joints):
+    if not any(joint.has_sensor for joint in joints):
         raise InputError(
             f"{source or 'the machine'}: no joint of {in_words(joints)} has a measured torque,"
             " expected one at least, as it fixes the scale of inertia and friction"

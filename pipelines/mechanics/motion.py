@@ -349,6 +349,9 @@ def motion_from_table(table: Table, default_geometry: Geometry | None = None) ->
         is_there = {joint.column(quantity) for joint in joints} <= set(frame.columns)
         return per_joint(quantity) if is_there else None
 
+    # One that was not measured is zero here: a single NaN would spread through every filter. No
+    # equation of such a joint is used.
+    is_known = [joint.is_measured for joint in joints]
     force_columns = [f"{cuff}_force_{axis}_n" for cuff in CUFFS for axis in "xyz"]
     has_forces = set(force_columns) <= set(frame.columns)
     return Motion(
@@ -356,7 +359,7 @@ def motion_from_table(table: Table, default_geometry: Geometry | None = None) ->
         q=per_joint("angle"),
         dq=per_joint("velocity"),
         ddq=per_joint("acceleration"),
-        torque=per_joint("torque"),
+        torque=np.where(is_known, per_joint("torque"), 0.0),
         segment=np.array(frame["segment"], dtype=np.int64),
         valid=np.array(frame["valid"], dtype=bool),
         run=metadata["run"],

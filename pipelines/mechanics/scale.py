@@ -60,5 +60,8 @@ def _scales(runs: Sequence[Run]) -> tuple[Scale, ...]:
     driven = torque[torque > 0]
     torque = np.where(torque > 0, torque, driven.min() if len(driven) else torque_nm)
     torque = torque / torque_nm
+    # A joint whose torque was not measured may rest; its encoder's noise is no scale of speed.
+    measured = runs[0].machine.measured
+    speed = np.where(measured, speed, np.maximum(speed, speed[measured].min()))
     speed = np.where(speed > 0, speed / speed_rad_s, 1.0)
     return tuple(Scale(*row) for row in np.column_stack([torque, speed, travel]).tolist())

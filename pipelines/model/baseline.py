@@ -33,8 +33,9 @@ def baseline(
     cuffs : bool
         Whether cuff forces are fitted; their sensors then have zeros.
     """
+    # Friction shows in its own joint's torque alone, so it needs a measured one.
     # Without such data, both bodies would have the same columns.
     wearer = [RigidBody(run="with_human", on=machine)] * (len(kinds) == 2 or cuffs)
-    friction = (Friction(joint=joint, on=machine) for joint in machine.names)
+    friction = (Friction(joint=joint, on=machine) for joint in machine.measured_names)
     zeros = [ForceSensorZero(on=machine)] * cuffs
     return (RigidBody(on=machine), *wearer, *friction, *known, *zeros)

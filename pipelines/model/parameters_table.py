@@ -122,6 +122,8 @@ def unrealizable(parameters: "pd.DataFrame", machine: Machine, geometry: Geometr
     return [
         f"{run}: {reason}"
         for run, rows in bodies.groupby("run", sort=False)
+        # A body of which a part is not determined cannot be judged.
+        if len(rows) == len(machine.mechanism.parameters)
         for reason in machine.mechanism.unrealizable(rows["value"].to_numpy(float), geometry)
     ]
 

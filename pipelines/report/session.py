@@ -142,6 +142,11 @@ class Session:
                 return joints_of(artifact.metadata)
         return ()
 
+    @property
+    def measured_joints(self) -> tuple[Joint, ...]:
+        """The joints whose torque is known; the others have no error."""
+        return tuple(joint for joint in self.joints if joint.is_measured)
+
     @cached_property
     def verdict_file(self) -> Artifact | None:
         """The verdict: the only one, or the one in ``diagnosed/``.

@@ -250,7 +250,8 @@ class JointSettings(Settings):
     kind: Kind = Field("revolute", description="revolute turns, prismatic slides.")
     drive: Drive = Field(
         "measured",
-        description='"none" for a passive joint: its torque is zero, and has no column.',
+        description='"none" for a passive joint: its torque is zero, and has no column.'
+        ' "unmeasured" for a joint whose torque was not recorded: its motion is a known input.',
     )
     turns: bool = Field(False, description="Whether it turns without end: its angle has no limit.")
     enabled: str | None = Field(None, description="Column that is 0 while the drive is off.")
@@ -268,10 +269,13 @@ class JointSettings(Settings):
     def _torque_is_of_a_drive(self) -> Self:
         if self.drive == "measured" and self.torque is None:
             raise ValueError(
-                'torque: missing; add it, or set drive = "none" for a joint without a drive'
+                'torque: missing; add it, or set drive = "none" for a joint without a drive,'
+                ' drive = "unmeasured" for one whose torque was not recorded'
             )
-        if self.drive == "none" and self.torque is not None:
-            raise ValueError('torque: found with drive = "none", expected none; remove one of them')
+        if self.drive != "measured" and self.torque is not None:
+            raise ValueError(
+                f'torque: found with drive = "{self.drive}", expected none; remove one of them'
+            )
         if self.turns and self.kind == "prismatic":
             raise ValueError("turns: found at a prismatic joint, expected a revolute one")
         return self
@@ -384,9 +388,9 @@ class ImportMap(Settings):
 
     @model_validator(mode="after")
     def _fits_together(self) -> Self:
-        if all(joint.drive == "none" for joint in self.joint):
+        if not any(joint.joint.has_sensor for joint in self.joint):
             raise ValueError(
-                "joint: none has a drive, expected one at least, as its torque fixes the scale of"
+                "joint: none has a measured torque, expected one at least, as it fixes the scale of"
                 " inertia; give one a torque"
             )
         for name in repeated(joint.name for joint in self.joint):

@@ -19,7 +19,10 @@ class JointSettings(Settings):
 
     name: str = Field(pattern="^[a-z][a-z0-9_]*$", description="Columns of files begin with it.")
     kind: Kind = Field("revolute", description='"revolute" or "prismatic".')
-    drive: Drive = Field("measured", description='"none" for a passive joint.')
+    drive: Drive = Field(
+        "measured",
+        description='"none" for a passive joint; "unmeasured" if its torque was not recorded.',
+    )
     turns: bool = Field(False, description="Whether it turns without end.")
 
 

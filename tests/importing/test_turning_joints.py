@@ -82,7 +82,7 @@ def test_a_slide_does_not_turn(imported, shaft, write_csv):
         (('torque = { column = "torque", unit = "N·m" }', ""), 'or set drive = "none" for a joint'),
         (
             ('torque = { column = "torque", unit = "N·m" }', 'drive = "none"'),
-            "joint: none has a drive, expected one at least",
+            "joint: none has a measured torque, expected one at least",
         ),
     ],
 )

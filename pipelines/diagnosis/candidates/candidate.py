@@ -220,7 +220,8 @@ def lowest(effect: Effect, parameter: Parameter, runs: Sequence[Run]) -> float:
     # Fewest waves of a ripple within the swept angles. With fewer it does not repeat, and
     # together with a spring it fits any function of the angle.
     fewest_waves = 1.5
-    return fewest_waves * 2.0 * np.pi / swept
+    # A joint whose torque was not measured may rest, and shows no wave then.
+    return fewest_waves * 2.0 * np.pi / swept if swept > 0.0 else np.inf
 
 
 def proposals(baseline: Baseline, kinds: Sequence[str]) -> Iterator[Effect]:

@@ -97,8 +97,8 @@ def _coarse_steps(
     ]
     usable = [run.motion.valid[:, np.newaxis] & away_from_reversals(run.motion) for run in runs]
     for j, joint in enumerate(prepared.baseline.machine.joints):
-        # No reading of a passive joint's torque can be rounded.
-        if joint.is_passive:
+        # Only a reading can be rounded.
+        if not joint.has_sensor:
             continue
         rms = float(prepared.torque[j])
         torque, residuals = (
@@ -146,7 +146,7 @@ def curve_rows(
         # The constant counts as the slowest cosine, as pink noise has no finite density at 0.
         hz = np.maximum(np.arange(len(variance)), 1) / (2.0 * duration)
         noise = 2.0 * prepared.noise.excess(hz, LENGTH_S)[: regression.joints] / duration
-        for j in range(regression.joints):
+        for j in np.flatnonzero(run.motion.machine.measured).tolist():
             parts = [np.zeros((*other.measured.shape, len(variance))) for other in prepared.runs]
             parts[r][:, j] = curves * prepared.torque[j]
             share = np.nan_to_num(noise[j] / prepared.torque[j] ** 2)

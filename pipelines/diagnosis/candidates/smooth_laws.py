@@ -114,7 +114,8 @@ def smooth_laws(run: Run, spans: Spans, load: NDArray) -> tuple[list[LawColumn],
     joints = run.state[0].shape[1]
     laws: list[LawColumn] = []
     parts: list[tuple[int | slice, NDArray]] = []
-    for j in range(joints):
+    # The torque at a joint where it was not measured shows nothing.
+    for j in np.flatnonzero(run.motion.machine.measured).tolist():
         for kind, degree, column in _laws_of(run, spans, load, j):
             # Real laws are smooth: the prior variance falls with the degree.
             laws.append(LawColumn(kind, j, "all", 1.0 / (1.0 + degree)))
@@ -203,18 +204,19 @@ def _laws_of(run: Run, spans: Spans, load: NDArray, j: int) -> Iterator[LawTerm]
     scaled = _ScaledMotion(
         q, run.state[1] / spans.speed, run.state[2] / spans.acceleration, load / spans.torque
     )
-    passive = [joint.is_passive for joint in run.motion.machine.joints]
+    joints = run.motion.machine.joints
     yield from scaled.laws_of_itself(j)
     # A passive joint carries no load: what is predicted there is the residual itself, and a gain on
     # it would explain all of that.
-    if not passive[j]:
+    if joints[j].has_sensor:
         yield from scaled.laws_of_load(j)
     # Half waves over the longest run: the slowest change is a single rise or fall.
     phase = np.pi * (run.time - run.time[0]) / spans.duration_s
-    if not passive[j]:
+    if joints[j].has_sensor:
         # A constant gain of the drives would let bodies without inertia explain that a passive
         # joint has no torque.
-        for k in range(1 if any(passive) else 0, 4):
+        lowest = 1 if any(joint.is_passive for joint in joints) else 0
+        for k in range(lowest, 4):
             yield "gain_over_time", k, scaled.tau[:, j] * np.cos(k * phase)
     for k in range(1, 4):
         yield "friction_over_time", k, scaled.way[:, j] * np.cos(k * phase)
@@ -223,7 +225,7 @@ def _laws_of(run: Run, spans: Spans, load: NDArray, j: int) -> Iterator[LawTerm]
         yield from _scaled("both_angles", _of_sum(run, spans), range(1, 6))
     for o in range(len(q)):
         if o != j:
-            yield from scaled.laws_of_another(j, o, carries_load=not passive[o])
+            yield from scaled.laws_of_another(j, o, carries_load=joints[o].has_sensor)
 
 
 @dataclass(frozen=True)

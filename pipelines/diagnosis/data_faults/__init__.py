@@ -75,9 +75,8 @@ def find_faults(motions: Sequence[Motion], accept: Sequence[FaultKind] = ()) -> 
 def _has_two_drives(motion: Motion) -> bool:
     """Return whether a motion is of a leg whose joints both have a drive."""
     machine = motion.machine
-    return machine.mechanism.name == LEG.name and not any(
-        joint.is_passive for joint in machine.joints
-    )
+    is_leg = machine.mechanism.name == LEG.name
+    return is_leg and all(joint.has_sensor for joint in machine.joints)
 
 
 def _of_legs(runs: Sequence[Averages]) -> list[Fault]:

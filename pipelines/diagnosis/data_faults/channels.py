@@ -63,7 +63,7 @@ def channel_faults(motion: Motion) -> Iterator[Fault]:
     for joint in range(motion.torque.shape[1]):
         yield from _stuck_angle(motion, joint)
         # A passive joint's torque is zero throughout, and no channel.
-        if not motion.machine.joints[joint].is_passive:
+        if motion.machine.joints[joint].has_sensor:
             yield from _torque(motion, joint)
     if motion.held_forces is not None and motion.run == "with_human":
         yield from _forces(motion, motion.held_forces)
@@ -208,6 +208,9 @@ def _impossible(
     edges = steps[[k for k in (start - 1, stop - 1) if 0 <= k < len(steps)]]
     if usual > 0 and (edges > JUMP * usual).any():
         return True
+    # A joint whose torque was not measured may be held by a brake.
+    if not motion.machine.joints[joint].is_measured:
+        return False
     seconds = (stop - start) / motion.sample_rate_hz
     # Second test: the set-point went further than friction can hold a joint against its drive.
     if motion.reference is not None and np.isfinite(motion.reference[start:stop, joint]).all():

@@ -88,7 +88,7 @@ class Averages:
     def joints(self) -> list[int]:
         """Numbers of the joints that have a drive."""
         joints = self.motion.machine.joints
-        return [j for j, joint in enumerate(joints) if not joint.is_passive]
+        return [j for j, joint in enumerate(joints) if joint.has_sensor]
 
     @property
     def is_leg(self) -> bool:

@@ -55,7 +55,8 @@ def _of_other(run: Run, order: int, j: int) -> NDArray | None:
 
 
 def _load_of_other(run: Run, j: int) -> NDArray | None:
-    return _load(run, 1 - j) if len(run.motion.joints) == 2 else None
+    two = len(run.motion.joints) == 2
+    return _load(run, 1 - j) if two and run.motion.machine.measured.all() else None
 
 
 def _since_reversal(run: Run, j: int) -> NDArray:
@@ -168,6 +169,9 @@ def dependences(runs: Sequence[Run], residuals: Sequence[NDArray]) -> list[Depen
     machine = runs[0].motion.machine
     results = []
     for j, joint in enumerate(machine.names):
+        # Without a measured torque there is no residual.
+        if not machine.measured[j]:
+            continue
         shares = {v: variable_share(v, runs, residuals, j) for v in VARIABLES if knows(v, runs, j)}
         terms = []
         for v, share in shares.items():

@@ -86,9 +86,8 @@ def smooth_term(runs: Sequence[Run], residuals: Sequence[NDArray]) -> SmoothTerm
     -------
     SmoothTerm
     """
-    terms = [
-        _of_joint(runs, [r[:, j] for r in residuals], j) for j in range(len(runs[0].motion.joints))
-    ]
+    joints = np.flatnonzero(runs[0].motion.machine.measured).tolist()
+    terms = [_of_joint(runs, [r[:, j] for r in residuals], j) for j in joints]
     return SmoothTerm(tuple(surface for surface in terms if surface is not None))
 
 

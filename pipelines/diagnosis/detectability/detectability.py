@@ -159,7 +159,9 @@ class DetectionProblem:
         rms = np.sqrt(np.mean(torque**2, axis=0))
         problem = cls(loaded, baseline, untouched, values, root, independent, np.zeros((0, 0)), rms)
         # The basis is made of weighted rows, which the problem itself provides.
-        return replace(problem, basis=np.linalg.qr(problem.rows(untouched))[0])
+        rows = problem.rows(untouched)
+        # QR would invent a direction for a column of zeros.
+        return replace(problem, basis=np.linalg.qr(rows[:, rows.any(axis=0)])[0])
 
     def rows(self, columns: Sequence[NDArray]) -> NDArray:
         """Return columns as weighted rows, usable ones only.
@@ -196,8 +198,13 @@ class DetectionProblem:
         return rows
 
     def joint(self, effect: Effect) -> int:
-        """Return the joint at which an effect's size is given: for a whole machine the first."""
-        return max(effect.column(self.runs[0].motion), 0)
+        """Return the joint at which an effect's size is given: its own, if it is measured.
+
+        For a whole machine it is the first, and otherwise the first measured one.
+        """
+        motion = self.runs[0].motion
+        j = max(effect.column(motion), 0)
+        return j if motion.machine.measured[j] else int(np.argmax(motion.machine.measured))
 
     def rms(self, effect: Effect, column: Sequence[NDArray]) -> float:
         """Return the rms of a column at the effect's joint, where it acts.

@@ -6,7 +6,7 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import NDArray
 
-from pipelines.contracts.joints import the
+from pipelines.contracts.joints import AT_REST, the
 from pipelines.errors import InputError
 from pipelines.estimation.regression import away_from_reversals, reversal_speeds
 from pipelines.mechanics.motion import Motion
@@ -108,6 +108,9 @@ def _refuse_standstill(motions: Sequence[Motion], session: Sequence[Motion]) -> 
     least_s = 5.0
     least = machine.lasting(least_s)
     for j, joint in enumerate(machine.joints):
+        # One whose torque was not measured may rest.
+        if not joint.is_measured:
+            continue
         # First: a constant angle is the reason why a joint seems not to move.
         _refuse_dead_angle(motions, j, session)
         lasts = _seconds(motions, [m[:, j] for m in moving])
@@ -125,12 +128,12 @@ def _refuse_standstill(motions: Sequence[Motion], session: Sequence[Motion]) -> 
     # Least time for which all joints of an exoskeleton move at once, s: errors are scored there.
     together_s = 2.0
     least = machine.lasting(together_s)
-    lasts = _seconds(motions, [m.all(axis=1) for m in moving])
+    lasts = _seconds(motions, [m[:, machine.measured].all(axis=1) for m in moving])
     if lasts < least:
         raise InputError(
-            f"{files}: {' and '.join(machine.names)} move at once for {_rounded_down(lasts):.1f} s,"
-            f" expected {least:.2g} s {together}: errors are scored there; excite both joints at"
-            " the same time, or record longer"
+            f"{files}: {' and '.join(machine.measured_names)} move at once for"
+            f" {_rounded_down(lasts):.1f} s, expected {least:.2g} s {together}: errors are"
+            " scored there; excite both joints at the same time, or record longer"
         )
 
 
@@ -143,7 +146,7 @@ def _refuse_dead_torque(motions: Sequence[Motion], joint: int) -> None:
     """Raise InputError for a torque that is constant while its joint moves."""
     here = motions[0].machine.joints[joint]
     values = np.concatenate([m.torque[m.valid, joint] for m in motions])
-    if len(values) and np.ptp(values) == 0.0 and not here.is_passive:
+    if len(values) and np.ptp(values) == 0.0 and here.has_sensor:
         # Adding zero turns a -0.0 into 0.0 in the message.
         raise silent_torque(motions, here, float(values[0]) + 0.0)
 
@@ -172,7 +175,7 @@ def _simpler(motions: Sequence[Motion], joint: int, session: Sequence[Motion]) -
     others = (m for m in session if not any(m is one for one in motions))
     moves_in = next((m.file for m in others if _moves(m, joint)), None)
     if moves_in is None:
-        return f", or leave it out of {settings_of(motions[0])} if it rests"
+        return f"; {AT_REST}"
     purpose = "train" if motions[0].purpose == "train" else "validate"
     return f", or {purpose} on a run in which it moves, as in {moves_in}"
 

@@ -71,4 +71,9 @@ def varying_torque(runs: Sequence[Run], baseline: Baseline, values: NDArray) -> 
             # Half, because parts that balance in pairs have the size of either.
             squares[j] += 0.5 * np.sum(parts**2)
         count += number
-    return np.sqrt(np.maximum(squares, 0.0) / np.maximum(count, 1))
+    torque = np.sqrt(np.maximum(squares, 0.0) / np.maximum(count, 1))
+    # Columns are shares of the torque, also at a joint whose torque was not measured.
+    measured = baseline.machine.measured
+    drives = torque[: len(measured)]
+    drives[~measured] = drives[measured].min()
+    return torque

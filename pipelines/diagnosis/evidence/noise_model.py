@@ -138,9 +138,10 @@ def noise_model(runs: Sequence[Run], residuals: Sequence[NDArray]) -> NoiseModel
     if any(len(one) for one in differences):
         # Highest frequency of the fit, Hz: blocks of 25 ms pass it, and impacts are mostly above.
         highest_hz = 6.0
+        measured = runs[0].motion.machine.measured
         fits = _spectra(runs, differences, (NoiseModel.wander_hz, highest_hz))
         # With many gaps, hardly a block is usable in two periods.
-        if np.isfinite(fits[0, : len(runs[0].motion.joints)]).all():
+        if np.isfinite(fits[0, : len(measured)][measured]).all():
             return NoiseModel(fits[0], fits[1], fits[2], from_periods=True)
     series = [
         np.where(run.usable, residual, np.nan)

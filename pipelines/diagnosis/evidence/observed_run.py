@@ -10,7 +10,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from pipelines.estimation.regression import away_from_reversals, away_from_turns, block_average
+from pipelines.estimation.regression import (
+    away_from_reversals,
+    away_from_turns,
+    block_average,
+    with_rest,
+)
 from pipelines.mechanics.motion import Motion
 from pipelines.mechanics.slow_motion import filtered, unsure
 from pipelines.signals.blocks import BlockAverage
@@ -33,7 +38,7 @@ class Run:
     measured: NDArray
     """(m, O) N·m; zero where there is no such output."""
     usable: NDArray
-    """(m, O) bool."""
+    """(m, O) bool; false at a joint whose torque was not measured."""
     valid: NDArray
     """(m,) bool."""
     fold: NDArray
@@ -152,13 +157,15 @@ def observe(motion: Motion, cutoff_hz: float | None = None) -> Run:
     Run
         m blocks of 2 J outputs: drives, then cuffs.
     """
+    motion = with_rest(motion)
     block = block_average(motion)
     starts = block.starts(motion.segment)
     time = block.mean(motion.time, starts)
     # Next to a gap a low-pass lacks the samples of one side.
     trusted = motion.valid if cutoff_hz is None else motion.valid & ~unsure(motion, cutoff_hz)
     valid = block.all(trusted, starts)
-    usable = valid[:, np.newaxis] & block.all(away_from_reversals(motion), starts)
+    away = block.all(away_from_reversals(motion), starts) & motion.machine.measured
+    usable = valid[:, np.newaxis] & away
     outputs = [motion.torque]
     cuffs = motion.cuff_torque(motion.q) if motion.run == "with_human" else None
     if cuffs is None:

@@ -52,9 +52,10 @@ def traces_of(motion: Motion, residual: NDArray) -> list[Trace]:
     Returns
     -------
     list of Trace
-        Samples near reversals, or without a residual, are not usable.
+        Samples near reversals, or without a residual or a measured torque, are not usable.
     """
-    usable = motion.valid[:, np.newaxis] & away_from_reversals(motion) & np.isfinite(residual)
+    known = np.isfinite(residual) & motion.machine.measured
+    usable = motion.valid[:, np.newaxis] & away_from_reversals(motion) & known
     return [
         Trace(
             motion.time,

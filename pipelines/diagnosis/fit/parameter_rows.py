@@ -22,7 +22,8 @@ from pipelines.estimation.sandwich import sandwich
 def parameters(fit: Fit, baseline: Baseline, sure: Uncertainty) -> tuple[pd.DataFrame, NDArray]:
     """Return ``parameters/1`` of a fit, and the covariance of its rows.
 
-    There is a rigid body for each kind of run, and the human's.
+    There is a rigid body for each kind of run, and the human's. Inertial parameters that nothing
+    determines are left out.
 
     Parameters
     ----------
@@ -42,9 +43,13 @@ def parameters(fit: Fit, baseline: Baseline, sure: Uncertainty) -> tuple[pd.Data
     units = np.eye(len(sure.covariance))
     values = np.append(fit.values, np.zeros(len(units) - len(fit.values)))
     rows: list[Row] = []
+    # Their columns are zero at every output that was measured.
+    unknown = np.flatnonzero(np.diag(sure.normal) == 0.0)
     for run, bodies in _bodies(baseline).items():
         slopes = units[bodies].sum(axis=0)
-        rows += rows_of(RigidBody(run=run, on=baseline.machine), slopes @ values, slopes, "inertia")
+        body = RigidBody(run=run, on=baseline.machine)
+        of_body = rows_of(body, slopes @ values, slopes, "inertia")
+        rows += [row for row in of_body if not row.slope[unknown].any()]
     for term in baseline.layout.terms:
         if not isinstance(term.effect, (RigidBody, ForceSensorZero)):
             step = "extension" if term.effect in baseline.known else "friction"
@@ -150,13 +155,14 @@ def _residual_rows(run: Run, residual: NDArray, model: str) -> pd.DataFrame:
         "model": model,
         "scored": scored(run),
     }
+    torque = np.where(run.motion.machine.measured, run.measured[:, :J], np.nan)
     quantities: Mapping[str, NDArray] = {
         "angle": run.state[0],
         "velocity": run.state[1],
         "acceleration": run.state[2],
-        "torque": run.measured[:, :J],
-        "predicted": run.measured[:, :J] - residual[:, :J],
-        "residual": residual[:, :J],
+        "torque": torque,
+        "predicted": torque - residual[:, :J],
+        "residual": np.where(run.motion.machine.measured, residual[:, :J], np.nan),
     }
     for j, joint in enumerate(joints):
         columns |= {joint.column(name): values[:, j] for name, values in quantities.items()}

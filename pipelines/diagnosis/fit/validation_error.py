@@ -23,11 +23,17 @@ class Errors:
     """(b,)."""
     unmasked: NDArray
     """(J,) rms on every valid sample, N·m."""
+    measured: NDArray | bool = True
+    """(J,) bool: joints whose torque is known; the error of the others is zero here."""
 
     @property
     def rms(self) -> NDArray:
         """(J,) N·m over all scored samples."""
         return np.sqrt(self.squares.sum(axis=0) / max(self.counts.sum(), 1))
+
+    def falls_most(self, after: "Errors") -> int:
+        """Return the joint at which another model's error is smaller by most."""
+        return int(np.argmax(np.where(self.measured, self.rms - after.rms, -np.inf)))
 
 
 def scored(run: Run) -> NDArray:
@@ -41,9 +47,10 @@ def scored(run: Run) -> NDArray:
     Returns
     -------
     (m,) bool array
-        Whether every drive's output is usable.
+        Whether every measured drive's output is usable.
     """
-    return np.asarray(run.usable[:, : len(run.motion.joints)].all(axis=1))
+    measured = run.motion.machine.measured
+    return np.asarray(run.usable[:, : len(measured)][:, measured].all(axis=1))
 
 
 def errors_of(runs: Sequence[Run], residuals: Sequence[NDArray]) -> Errors:
@@ -63,20 +70,25 @@ def errors_of(runs: Sequence[Run], residuals: Sequence[NDArray]) -> Errors:
     # Length of a bootstrap block where the excitation does not repeat.
     stretch_s = 5.0
     for run, residual in zip(runs, residuals, strict=True):
-        J = len(run.motion.joints)
+        measured = run.motion.machine.measured
+        J = len(measured)
+        residual = np.where(measured, residual[:, :J], 0.0)
         chosen = scored(run)
         # Errors within a period are dependent, so whole periods are drawn in the bootstrap.
         length = run.motion.period_s or stretch_s
         number = np.floor(run.time / length).astype(int)
         number -= number.min()
         own = np.zeros((number.max() + 1, J))
-        np.add.at(own, number[chosen], residual[chosen, :J] ** 2)
+        np.add.at(own, number[chosen], residual[chosen] ** 2)
         squares.append(own)
         counts.append(np.bincount(number[chosen], minlength=number.max() + 1))
-        everywhere = everywhere + np.sum(residual[run.valid, :J] ** 2, axis=0)
+        everywhere = everywhere + np.sum(residual[run.valid] ** 2, axis=0)
         valid += int(run.valid.sum())
     return Errors(
-        np.concatenate(squares), np.concatenate(counts), np.sqrt(everywhere / max(valid, 1))
+        np.concatenate(squares),
+        np.concatenate(counts),
+        np.sqrt(everywhere / max(valid, 1)),
+        runs[0].motion.machine.measured,
     )
 
 
@@ -103,7 +115,7 @@ def gain(before: Errors, after: Errors, joint: int | None = None, seed: int = 0)
         Seed of the random draws.
     """
     if joint is None:
-        joint = int(np.argmax(before.rms - after.rms))
+        joint = before.falls_most(after)
     rng = np.random.default_rng(seed)
     blocks = len(before.counts)
     # Bootstrap samples of an interval.

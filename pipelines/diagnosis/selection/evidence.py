@@ -101,7 +101,9 @@ class Nonnegative:
         count : int
             Number of all columns.
         """
-        regression, chosen = library.regression, library.prepared.baseline.nonnegative
+        regression, known = library.regression, library.prepared.baseline.nonnegative
+        # A value that no measured torque depends on has no variance.
+        chosen = [k for k in known if regression.baseline[:, k].any()]
         values = regression.baseline_values(regression.torque_rows[:, np.newaxis])[:, 0]
         # An unlisted law may contain friction itself, so it imitates none.
         imitation = np.zeros((len(values), count))
@@ -233,10 +235,11 @@ def _stack(library: Library) -> tuple[NDArray, _Places]:
 
 
 def _elements(library: Library, at: _Places) -> list[Element]:
-    names = library.prepared.baseline.joints
+    machine = library.prepared.baseline.machine
+    names = machine.names
     # A law is one element with all of its columns: none of them is missing by itself.
     laws = _laws_by_kind(library.laws, at.laws)
-    for j in range(len(names)):
+    for j in np.flatnonzero(machine.measured).tolist():
         own = [
             (int(p), c.variance)
             for p, c in zip(at.curves, library.curves, strict=True)
@@ -280,6 +283,7 @@ def _elements(library: Library, at: _Places) -> list[Element]:
             log_prior=float(ratio),
         )
         for joint, ratio in zip(names, library.prepared.bursts, strict=True)
+        if machine.joint(joint).is_measured
     ]
     effects = [cause.candidate.effect for cause in library.causes]
     return _in_any_form(

@@ -269,7 +269,8 @@ def select(prepared: PreparedRuns, report: Report = silent) -> Selection:
 def _refuse_unknown_noise(prepared: PreparedRuns) -> None:
     """Raise InputError where too little of a joint's torque is usable to measure its noise."""
     for j, joint in enumerate(prepared.baseline.joints):
-        if not np.isfinite(prepared.noise.density[j]):
+        measured = prepared.baseline.machine.measured[j]
+        if measured and not np.isfinite(prepared.noise.density[j]):
             usable = sum(int(run.usable[:, j].sum()) for run in prepared.runs)
             raise InputError(
                 f"{', '.join(run.motion.file for run in prepared.runs)}: {usable} blocks of"

@@ -60,9 +60,9 @@ def _row(
         "probability": probability,
     }
     for j, joint in enumerate(d.baseline.machine.joints):
-        before = None if probability is None else float(d.before.errors.rms[j])
-        row[joint.column("rmse_before")] = before
-        row[joint.column("rmse_after")] = float(fitted.errors.rms[j]) if fitted else None
+        known = joint.is_measured and probability is not None
+        row[joint.column("rmse_before")] = float(d.before.errors.rms[j]) if known else None
+        row[joint.column("rmse_after")] = float(fitted.errors.rms[j]) if known and fitted else None
     return row | {"verdict": verdict, "reason": reason}
 
 
@@ -132,6 +132,7 @@ def _taken_up(effect: type[Effect], machine: Machine) -> dict[str, str]:
     """Return the joints at which other parameters absorb an effect whole, and which."""
     everywhere = machine.absorbs.get(effect.absorbed_as)
     by_joint = {
-        joint: everywhere or effect.absorbed.get(machine.place(joint)) for joint in machine.names
+        joint: everywhere or effect.absorbed.get(machine.place(joint))
+        for joint in machine.measured_names
     }
     return {joint: into for joint, into in by_joint.items() if into}

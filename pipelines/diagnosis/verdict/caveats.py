@@ -25,7 +25,9 @@ def caveats(d: Diagnosis) -> list[str]:
         for effect in d.baseline.known
     ]
     doubtful = [] if d.data.spoilt else [*_high_floor(d), *d.upside_down]
+    unmeasured = d.baseline.machine.unmeasured_in_words
     return [
+        *([unmeasured] if unmeasured else []),
         *known,
         *(f"{f.file}, {f.channel}: {f.in_words}" for f in d.data.doubts),
         *_at_ends(d),
@@ -46,7 +48,7 @@ def floor_that_hides(d: Diagnosis) -> dict[str, float]:
     """Return joints whose noise floor is high, with its share of their torque."""
     parts = zip(d.baseline.machine.joints, d.floor_rms, d.torque_rms, strict=True)
     # A passive joint's torque is zero.
-    shares = {joint.name: float(f / t) for joint, f, t in parts if not joint.is_passive}
+    shares = {joint.name: float(f / t) for joint, f, t in parts if joint.has_sensor}
     # Share of a joint's torque above which a noise floor is doubtful: no sensor is as noisy, and
     # friction is seldom more.
     hiding = 0.2

@@ -40,6 +40,8 @@ def error_budget(d: Diagnosis) -> dict[str, dict[str, float]]:
     scatter = scatter_between_periods(d.validate, d.after.residuals)
     budget = {}
     for j, joint in enumerate(d.baseline.joints):
+        if joint not in d.baseline.machine.measured_names:
+            continue
         shares = {"noise_floor": float(floor[j])} | {
             label: float(share[j]) for label, share in causes.items()
         }

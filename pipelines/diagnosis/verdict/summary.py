@@ -88,7 +88,8 @@ def _error_there(d: Diagnosis) -> str:
     Without a finding it is the joint whose error is largest compared with the noise.
     """
     of_finding = d.selected.findings[0].joint if d.selected.findings else None
-    place = d.baseline.joints.index(of_finding) if of_finding else _worst_joint(d)
+    measured = of_finding in d.baseline.machine.measured_names
+    place = d.baseline.joints.index(of_finding) if of_finding and measured else _worst_joint(d)
     joint = d.baseline.joints[place]
     effort = d.baseline.machine.joint(joint).effort
     return f"{the(joint).capitalize()}'s {effort} error is {_size(d, place)}."
@@ -224,7 +225,7 @@ def _they(causes: list[Cause]) -> str:
 def _no_gain_at_its_own(d: Diagnosis, causes: list[Cause]) -> str:
     """Report joints with a named cause whose error does not fall."""
     joints, after, before = d.baseline.joints, d.after.errors.rms, d.before.errors.rms
-    with_one = {cause.joint for cause in causes}
+    with_one = {cause.joint for cause in causes} & set(d.baseline.machine.measured_names)
     none = [joint for j, joint in enumerate(joints) if joint in with_one and after[j] >= before[j]]
     return "".join(
         f" At {the(joint)}, where a cause is named, the error does not fall." for joint in none

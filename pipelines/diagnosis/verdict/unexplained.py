@@ -30,11 +30,13 @@ def unexplained(d: Diagnosis, dependences: list[Dependence]) -> dict[str, Any]:
         r - np.nan_to_num(term.torque(run))
         for run, r in zip(d.validate, d.after.residuals, strict=True)
     ]
-    rms = zip(d.baseline.joints, errors_of(d.validate, joints).rms.tolist(), strict=True)
+    machine = d.baseline.machine
+    errors = errors_of(d.validate, joints).rms[machine.measured]
+    rms = zip(machine.measured_names, errors.tolist(), strict=True)
     # Most variables that the verdict lists for the remaining error.
     most = 5
     return {
-        "description": describe(d.baseline.machine, dependences, above, term.surfaces),
+        "description": describe(machine, dependences, above, term.surfaces),
         "depends_on": [
             {"joint": one.joint, "variable": one.variable, "share": one.share}
             for one in dependences[:most]

@@ -43,6 +43,7 @@ def verdict(d: Diagnosis) -> dict[str, Any]:
         "router": {
             joint.name: asdict(shares)
             for joint, shares in zip(joints, d.selected.router, strict=True)
+            if joint.is_measured
         },
         "posterior": _posterior(d),
         "acquisition_at_fault": bool(d.data.spoilt),
@@ -57,7 +58,11 @@ def verdict(d: Diagnosis) -> dict[str, Any]:
         "error_budget": error_budget(d),
         "depends_on": _depends_on(before, after),
         "reversals": [_reversal(d, one) for one in d.reversals],
-        "units": {j.name: {"torque": j.unit("torque"), "angle": j.unit("angle")} for j in joints},
+        "units": {
+            joint.name: {"torque": joint.unit("torque"), "angle": joint.unit("angle")}
+            for joint in joints
+            if joint.is_measured
+        },
         "known": [
             {"effect": e.name, "joint": e.joint, "parameters": _parameters(d, e)}
             for e in d.baseline.known
@@ -83,12 +88,13 @@ def verdict(d: Diagnosis) -> dict[str, Any]:
 
 def _numbers(d: Diagnosis) -> dict[str, Any]:
     """Return the verdict's numbers by joint."""
-    joints = d.baseline.joints
+    joints = d.baseline.machine.joints
 
     def by_joint(values: Any) -> dict[str, float | None]:
         if values is None:
-            return dict.fromkeys(joints)
-        pairs = zip(joints, values, strict=True)
+            values = [None] * len(joints)
+        # A joint whose torque was not measured has no error.
+        pairs = [(j.name, v) for j, v in zip(joints, values, strict=True) if j.is_measured]
         return {joint: None if v is None else float(v) for joint, v in pairs}
 
     before, after = d.before.errors, d.after.errors

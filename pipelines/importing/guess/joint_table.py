@@ -183,7 +183,11 @@ class _JointWriter:
             return
         if drive is None:
             self.proposal.table("[joint.torque]", f"{self.where}.torque")
-            self.proposal.unknown("column", "no column is named torque, current or voltage")
+            self.proposal.unknown(
+                "column",
+                "no column is named torque, current or voltage; if none was recorded, remove this"
+                ' table, and set drive = "unmeasured" next to the name',
+            )
             self.proposal.key("unit", "N" if self.slides else "N·m")
             return
         commanded = self.joint.columns[drive].commanded

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipelines.contracts.checks import LARGEST_ANGLE_RAD
-from pipelines.contracts.joints import in_words
+from pipelines.contracts.joints import AT_REST, in_words
 from pipelines.errors import InputError
 from pipelines.importing.finding import Finding, counted
 from pipelines.importing.quantities.consistency import MOST, SPAN, integral_agreement, whole_rows
@@ -64,8 +64,10 @@ def check(columns: Mapping[str, NDArray], settings: ImportMap) -> Iterator[Findi
         yield from _turns_on(columns, joint)
         yield from _slips(columns, joint)
         yield from _too_strong(columns, joint)
-    yield from _power(columns, settings.joint)
     joints = [joint.joint for joint in settings.joint]
+    # Drives whose torque was not measured may do the work that the others absorb.
+    if all(joint.is_measured for joint in joints):
+        yield from _power(columns, settings.joint)
     known = mechanisms_of(joints)
     has_length = any(mechanism.has_length for mechanism in known)
     if has_length and settings.geometry.thigh_length_m is None:
@@ -85,16 +87,15 @@ def check(columns: Mapping[str, NDArray], settings: ImportMap) -> Iterator[Findi
 def _still(
     columns: Mapping[str, NDArray], joint: JointSettings, *, is_only_joint: bool
 ) -> Iterator[Finding]:
-    for quantity in ("angle", *_torque_of(joint)):
+    # A joint may rest if its torque was not measured: its angle matters to the other joints.
+    angle = ("angle",) if joint.joint.is_measured else ()
+    for quantity in (*angle, *_torque_of(joint)):
         name = joint.joint.column(quantity)
         if np.ptp(columns[name]) == 0.0:
             action = "it carries no information"
             if quantity == "angle" and not is_only_joint:
                 # Another log, or another import, may have runs in which it moves.
-                action += (
-                    "; leave the joint out of the map if it rests in all runs, or else validate on"
-                    " a run in which it moves"
-                )
+                action += f"; {AT_REST}, or validate on a run in which it moves"
             if quantity == "torque" and not columns[name].any():
                 action += '; set drive = "none" in place of the table if the joint has no drive'
             yield Finding(name, f"is {columns[name][0]:.6g} in every row", action)
@@ -102,13 +103,13 @@ def _still(
 
 def _torque_of(joint: JointSettings) -> tuple[str, ...]:
     """Return the quantity torque, if the log has it."""
-    return () if joint.joint.is_passive else ("torque",)
+    return ("torque",) if joint.joint.has_sensor else ()
 
 
 def _too_short(columns: Mapping[str, NDArray], joint: JointSettings) -> Iterator[Finding]:
     name, (least, unit) = joint.joint.column("angle"), SHORTEST[joint.kind]
     reach = float(np.ptp(columns[name]))
-    if 0.0 < reach < least:
+    if 0.0 < reach < least and joint.joint.is_measured:
         seen = (
             f"moves over {reach:.3g} {unit} only, expected {least:g} {unit} or more to see inertia"
         )
@@ -160,6 +161,8 @@ def _every_kth(values: NDArray) -> NDArray:
 
 def _too_strong(columns: Mapping[str, NDArray], joint: JointSettings) -> Iterator[Finding]:
     quantity, unit = ("torque", "N·m") if joint.kind == "revolute" else ("force", "N")
+    if not joint.joint.has_sensor:
+        return
     name = joint.joint.column("torque")
     reach = float(np.quantile(np.abs(_every_kth(columns[name])), 0.99))
     if reach > STRONGEST[quantity]:

@@ -52,7 +52,7 @@ def candidates(session: Session) -> list[dict[str, Any]]:
 
 def _falls(session: Session, row: Row) -> list[str]:
     texts = []
-    for joint in session.joints:
+    for joint in session.measured_joints:
         before, after = row[joint.column("rmse_before")], row[joint.column("rmse_after")]
         if np.isfinite(after):
             texts.append(f"{joint.name} {digits(before)} → {digits(after)}")
@@ -82,7 +82,7 @@ def _probability(value: float) -> str:
 
 def _extra_gain(session: Session, less: Row, more: Row) -> str:
     """Return the gain of a set over a smaller one, at the joint where it is largest."""
-    after = [joint.column("rmse_after") for joint in session.joints]
+    after = [joint.column("rmse_after") for joint in session.measured_joints]
     return digits(max(less[column] - more[column] for column in after))
 
 

@@ -48,7 +48,7 @@ def torque_charts(session: Session) -> Iterator[Chart]:
         rows = residuals_of(session, run)
         measured = rows[rows["model"] == rows["model"].iloc[0]]
         models = [drawn(model, rows[rows["model"] == model]) for model in models_of(session)]
-        for joint in session.joints:
+        for joint in session.measured_joints:
             floor = session.noise_floor(joint)
             yield Chart(
                 key=f"torque-{run.removesuffix('.parquet')}-{joint.name}",
@@ -118,7 +118,8 @@ class Score:
 
 def scores(session: Session, run: str) -> list[Score]:
     """Return the errors of each model in a run: computed torque, then replays."""
-    results = [score for joint in session.joints for score in _torque_scores(session, run, joint)]
+    joints = session.measured_joints
+    results = [score for joint in joints for score in _torque_scores(session, run, joint)]
     # For each kind of replay: metadata key, quantity, words, factor and prefix of the unit.
     kinds = {
         "windows": (("simulation_rmse_rad", "angle", "1 s under the recorded {drive}", 1e3, "m"),),

@@ -27,7 +27,7 @@ class Against:
 def by_joint(session: Session, charts: Sequence[Chart]) -> list[dict[str, Any]]:
     """Return each joint with its charts, and the variables on which its error depends."""
     rows = []
-    for joint in session.joints:
+    for joint in session.measured_joints:
         own = [chart for chart in charts if chart.key.startswith(f"residual-{joint.name}-")]
         if own:
             rows.append({"name": joint.name, "charts": own, "depends": _predicted(session, joint)})
@@ -63,7 +63,8 @@ def _against(session: Session, joint: Joint) -> list[Against]:
     for other in session.joints:
         if other != joint and len(session.joints) == 2:
             for quantity, variable in variables.items():
-                if variable != "acceleration":
+                has_values = other.is_measured or variable != "load"
+                if variable != "acceleration" and has_values:
                     charts.append(_along(other, quantity, f"other_{variable}"))
     return [*charts, Against("time", "time", "time, s", "time_s")]
 
@@ -83,7 +84,7 @@ def residual_charts(session: Session) -> Iterator[Chart]:
     # Runs that no fit has seen, without reversals: no model of speed predicts a standing joint.
     judged = frame[frame["scored"] & (frame["purpose"] == "validate")]
     models = [drawn(model, judged[judged["model"] == model]) for model in models_of(session)]
-    for joint in session.joints:
+    for joint in session.measured_joints:
         # One height for all charts of a joint, so that their errors can be compared.
         reach = residual_reach(judged, joint)
         for one in _against(session, joint):

@@ -18,8 +18,9 @@ from pipelines.wording.label import number
 
 
 def figure(d: Diagnosis, verdict: Verdict) -> Figure:
-    """Draw angle, angle error, torque and torque error of each joint, a column each."""
-    joints, stretch = d.baseline.joints, worst_stretch(d)
+    """Draw angle, angle error, torque and torque error of each measured joint, a column each."""
+    joints, stretch = d.baseline.machine.measured_names, worst_stretch(d)
+    places = np.flatnonzero(d.baseline.machine.measured).tolist()
     drawn, axes = plt.subplots(
         4,
         len(joints),
@@ -30,7 +31,7 @@ def figure(d: Diagnosis, verdict: Verdict) -> Figure:
     )
     models = [("rigid body and friction", GREY, d.before)]
     models += [("with the causes", BLUE, d.after)] if d.causes else []
-    for j, (joint, column) in enumerate(zip(joints, axes.T, strict=True)):
+    for j, joint, column in zip(places, joints, axes.T, strict=True):
         effort = d.baseline.machine.joint(joint).effort
         _measured(column[0], column[2], d, stretch, j)
         column[1].axhline(0, color="black", lw=0.6)
@@ -119,7 +120,8 @@ def _angles(
 ) -> None:
     simulated = simulated_error(validated, d, stretch)
     motion = d.validate[stretch.run].motion
-    for j, (angle, error) in enumerate(zip(angles, errors, strict=True)):
+    places = np.flatnonzero(d.baseline.machine.measured).tolist()
+    for j, angle, error in zip(places, angles, errors, strict=True):
         if simulated is None:
             angle.plot([], [], color=colour, lw=2, label=f"{name} (cannot be simulated)")
             continue
@@ -140,7 +142,8 @@ def _torques(
 ) -> None:
     run = d.validate[stretch.run]
     blocks = stretch.within(run.time)
-    for j, (torque, error) in enumerate(zip(torques, errors, strict=True)):
+    places = np.flatnonzero(d.baseline.machine.measured).tolist()
+    for j, torque, error in zip(places, torques, errors, strict=True):
         known = run.usable[blocks, j]
         # NaN breaks the line near reversals, where no model is fitted.
         residual = np.where(known, validated.residuals[stretch.run][blocks, j], np.nan)
