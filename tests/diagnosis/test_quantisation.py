@@ -1,6 +1,7 @@
 """A torque reported in coarse steps: the step is found below noise, and called something in the
 sensor."""
 
+import tracemalloc
 from dataclasses import replace
 
 import numpy as np
@@ -62,6 +63,23 @@ def test_the_step_of_a_torque_that_never_comes_near_zero_is_found():
 
 
 @pytest.mark.slow
+def test_a_step_far_from_zero_is_found_in_little_memory():
+    rng = np.random.default_rng(2)
+    torque, step = 2000.0 + rng.normal(size=4000), 0.7
+    tracemalloc.start()
+    estimate = coarse_step([torque], [rounding(torque, step)], 1.0)
+    most = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert estimate == pytest.approx(step, rel=0.02)
+    assert most < 1e8
+
+
+def test_a_torque_that_hardly_varies_about_its_mean_has_no_step():
+    rng = np.random.default_rng(3)
+    torque = 1.0 + 1e-5 * rng.normal(size=4000)
+    assert coarse_step([torque], [rounding(torque, 5e-6)], 1e-5) is None
+
+
 def test_samples_that_do_not_count_have_no_say():
     """Spikes in a tenth of a session's samples, all of them marked as invalid."""
     spoilt = []

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.signal import czt
 
 
 @dataclass(frozen=True)
@@ -67,6 +68,10 @@ def coarse_step(torque: Sequence[NDArray], residual: Sequence[NDArray], rms: flo
     if not len(x) or not rms > 0.0:
         return None
     searched, middle = SearchedSteps(), float(np.median(x))
+    # Farthest median, in reaches: no reading of a real torque varies by so small a share of it.
+    farthest = 1000.0
+    if abs(middle) > farthest * searched.reach * rms:
+        return None
     # Bins of torque within the reach: 17 in the finest step. Each step then costs the same, however
     # long the recordings are.
     bins = 1024
@@ -78,9 +83,21 @@ def coarse_step(torque: Sequence[NDArray], residual: Sequence[NDArray], rms: flo
     count = round(per_line * searched.independent * (1.0 + abs(middle) / (searched.reach * rms)))
     # Even spacing in 1 / h, because all lines have the same width there.
     per_step = np.linspace(1.0 / searched.coarsest, 1.0 / searched.finest, count) / rms
-    waves = -np.sin(2.0 * np.pi * np.outer(per_step, 0.5 * (edges[1:] + edges[:-1])))
+    centres = 0.5 * (edges[1:] + edges[:-1])
+    # Sums of totals x -sin(2 pi x / h), and of counts x its square.
+    along = _spectrum(totals, centres, per_step).imag
+    size = 0.5 * (counts.sum() - _spectrum(counts, centres, 2.0 * per_step).real)
     # The phase is known: a line of opposite sign is no rounding error, and does not count.
-    along, size = waves @ totals, waves**2 @ counts
     explained = np.where(along > 0.0, along**2 / np.maximum(size, 1.0), 0.0)
     best = int(np.argmax(explained))
     return float(1.0 / per_step[best]) if explained[best] > 0.0 else None
+
+
+def _spectrum(weights: NDArray, x: NDArray, cycles: NDArray) -> NDArray:
+    """Return the sums over b of weights exp(-2 pi i cycles x), (c,), of evenly spaced x and cycles.
+
+    A matrix of all these waves would take gigabytes where the median is far from zero.
+    """
+    spacing, step = x[1] - x[0], cycles[1] - cycles[0]
+    ratio, first = np.exp(-2j * np.pi * step * spacing), np.exp(2j * np.pi * cycles[0] * spacing)
+    return np.exp(-2j * np.pi * cycles * x[0]) * czt(weights, len(cycles), ratio, first)
