@@ -19,7 +19,7 @@ from pipelines.errors import InputError
 from pipelines.estimation.angle_noise import CUTOFF_HZ, is_loud
 from pipelines.mechanics.even_grid import on_even_grid
 from pipelines.mechanics.motion import Motion
-from pipelines.mechanics.origin import how_to_add
+from pipelines.mechanics.remedies import how_to_add
 from pipelines.mechanics.scale import on_one_scale
 
 

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from pipelines.estimation.compressed import CompressedRows, compress, together
 from pipelines.estimation.regression import Regression, regressions
 from pipelines.estimation.undetermined import undetermined
+from pipelines.mechanics.constant_torque import constant_torque
 from pipelines.mechanics.run import Run, kinds_of
-from pipelines.mechanics.silence import silent_torque
 from pipelines.model import Model, ParameterLayout, Term
 
 
@@ -219,7 +219,7 @@ class Training:
         for j, joint in enumerate(self.runs[0].machine.joints if self.runs else ()):
             is_zero = all(part.count[j] > 0 and not part.torque[j].any() for part in parts)
             if is_zero and not joint.is_passive:
-                raise silent_torque(self.runs, joint, 0.0)
+                raise constant_torque(self.runs, joint, 0.0)
         return parts
 
     @cached_property

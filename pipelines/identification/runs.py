@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 
 from pipelines.errors import InputError
-from pipelines.mechanics.origin import how_to_add
+from pipelines.mechanics.remedies import how_to_add
 from pipelines.mechanics.run import Run, kinds_of
 
 

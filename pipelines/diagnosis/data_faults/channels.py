@@ -21,7 +21,7 @@ from pipelines.diagnosis.data_faults.fault import (
 from pipelines.diagnosis.data_faults.proof import Proof, compared, predictions
 from pipelines.diagnosis.data_faults.rigid_fit import averages
 from pipelines.mechanics.motion import CUFFS, Motion
-from pipelines.mechanics.origin import remedy_for_repeats
+from pipelines.mechanics.remedies import remedy_for_repeats
 from pipelines.mechanics.stretches import edge
 from pipelines.signals.blocks import dilate
 from pipelines.signals.held import are_held

@@ -24,7 +24,7 @@ from pipelines.estimation.regression import by_segment
 from pipelines.estimation.sandwich import sandwich
 from pipelines.mechanics.mechanisms.single import PENDULUM
 from pipelines.mechanics.motion import Motion
-from pipelines.mechanics.origin import mend_in
+from pipelines.mechanics.remedies import how_to_correct
 
 LEAST_BLOCKS = 50
 """Fewest averages from which an interval is estimated."""
@@ -50,7 +50,7 @@ def sign_faults(motion: Motion) -> Iterator[Fault]:
         f"the sign of {channel} is reversed, all along: as recorded {the(joint.name)} has an"
         f" inertia of {body:.4g} {inertia.unit} ({low:.4g} … {high:.4g}) and friction that loses"
         f" {loss:.2g} W ({lost_low:.2g} … {lost_high:.2g}). Both must be positive. A reversed"
-        f" {column(motion, 0, 'angle')} looks the same; {mend_in(motion, 'sign')}",
+        f" {column(motion, 0, 'angle')} looks the same; {how_to_correct(motion, 'sign')}",
         proof=by_motion(motion, replace(motion, torque=-motion.torque)),
     )
 

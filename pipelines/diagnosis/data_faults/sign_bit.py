@@ -16,7 +16,7 @@ from pipelines.diagnosis.data_faults.fault import Fault, column
 from pipelines.diagnosis.data_faults.mends import mended
 from pipelines.diagnosis.data_faults.proof import Proof, Ruling, by_motions
 from pipelines.mechanics.motion import Motion
-from pipelines.mechanics.origin import mend_in
+from pipelines.mechanics.remedies import how_to_correct
 
 
 def sign_bit_faults(motion: Motion) -> Iterator[Fault]:
@@ -43,7 +43,7 @@ def sign_bit_faults(motion: Motion) -> Iterator[Fault]:
                 motion.file,
                 name,
                 f"{name} has two branches, the second from {begin:.4g} on: a magnitude with a sign"
-                f" bit, read as a plain number; {mend_in(motion, 'sign_bit')}",
+                f" bit, read as a plain number; {how_to_correct(motion, 'sign_bit')}",
                 proof=proof,
             )
 

@@ -26,7 +26,7 @@ from pipelines.diagnosis.data_faults.proof import (
 )
 from pipelines.diagnosis.data_faults.rigid_fit import Averages, Columns, fit, pooled, predicted
 from pipelines.mechanics.motion import Motion
-from pipelines.mechanics.origin import mend_in
+from pipelines.mechanics.remedies import how_to_correct
 
 WRONG = 3.0
 """Least factor that is no gain, where it is well measured."""
@@ -87,7 +87,7 @@ def angle_unit_faults(motion: Motion) -> Iterator[Fault]:
             FaultKind.UNIT,
             motion.file,
             channel,
-            f"{channel} is {what}; {mend_in(motion, 'unit')}",
+            f"{channel} is {what}; {how_to_correct(motion, 'unit')}",
             proof=_proof_of_angle(motion, j, factor),
         )
         # A set-point may be in another unit, too, and a machine that is no leg may turn over.
@@ -159,7 +159,7 @@ class Scale:
             self.run.motion.file,
             channel,
             f"{wrong}: a factor of {self.factor:.3g} against {self.witness}, all along;"
-            f" {mend_in(self.run.motion, 'unit')}",
+            f" {how_to_correct(self.run.motion, 'unit')}",
             proof=self.proof,
         )
 

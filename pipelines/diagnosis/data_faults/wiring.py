@@ -28,7 +28,7 @@ from pipelines.diagnosis.data_faults.rigid_fit import (
     predicted,
 )
 from pipelines.mechanics.motion import CUFFS, Motion
-from pipelines.mechanics.origin import mend_in
+from pipelines.mechanics.remedies import how_to_correct
 
 FOLLOWS = 0.9
 """Correlation of an angle with its set-point from which it follows it."""
@@ -248,8 +248,8 @@ def _fault(motion: Motion, channels: Channels, how: str, why: str, proof: Proof 
         FaultKind.SIGN if how == SIGN else FaultKind.SWAP,
         motion.file,
         columns[0] if len(columns) == 1 else WHOLE_ROW,
-        f"the sign of {names} is reversed, all along{because}; {mend_in(motion, 'sign')}"
+        f"the sign of {names} is reversed, all along{because}; {how_to_correct(motion, 'sign')}"
         if how == SIGN
-        else f"{names} are swapped, all along{because}; {mend_in(motion, 'column')}",
+        else f"{names} are swapped, all along{because}; {how_to_correct(motion, 'column')}",
         proof=proof,
     )

@@ -9,10 +9,10 @@ from numpy.typing import NDArray
 from pipelines.contracts.joints import AT_REST, the
 from pipelines.errors import InputError
 from pipelines.estimation.regression import away_from_reversals, reversal_speeds
+from pipelines.mechanics.constant_torque import constant_torque
 from pipelines.mechanics.motion import Motion
-from pipelines.mechanics.origin import settings_of
+from pipelines.mechanics.remedies import settings_of
 from pipelines.mechanics.run import refuse_several_machines
-from pipelines.mechanics.silence import silent_torque
 
 
 def refuse_unfit(motions: Sequence[Motion]) -> None:
@@ -148,7 +148,7 @@ def _refuse_dead_torque(motions: Sequence[Motion], joint: int) -> None:
     values = np.concatenate([m.torque[m.valid, joint] for m in motions])
     if len(values) and np.ptp(values) == 0.0 and here.has_sensor:
         # Adding zero turns a -0.0 into 0.0 in the message.
-        raise silent_torque(motions, here, float(values[0]) + 0.0)
+        raise constant_torque(motions, here, float(values[0]) + 0.0)
 
 
 def _refuse_dead_angle(motions: Sequence[Motion], joint: int, session: Sequence[Motion]) -> None:

@@ -1,4 +1,4 @@
-"""The origin of a run, and the file in which its description is corrected: a rig file or a map."""
+"""What to change so that a run is right: in the rig file, or in the map of its import."""
 
 from collections.abc import Sequence
 
@@ -10,11 +10,11 @@ def settings_of(run: Run) -> str:
     return "the map" if "imported" in run.metadata else "the rig file"
 
 
-def mend_in(run: Run, key: str) -> str:
-    """Return how to mend a channel: the key of the map of its import, or the rig file."""
+def how_to_correct(run: Run, key: str) -> str:
+    """Return how to correct a channel: the key of the map of its import, or the rig file."""
     if "imported" in run.metadata:
         return f"change its `{key}` in the map"
-    return "mend its register in the rig file"
+    return "correct its register in the rig file"
 
 
 def remedy_for_repeats(run: Run) -> str:

@@ -4,11 +4,11 @@ from collections.abc import Sequence
 
 from pipelines.contracts.joints import Joint, the
 from pipelines.errors import InputError
-from pipelines.mechanics.origin import settings_of
+from pipelines.mechanics.remedies import settings_of
 from pipelines.mechanics.run import Run
 
 
-def silent_torque(runs: Sequence[Run], joint: Joint, value: float) -> InputError:
+def constant_torque(runs: Sequence[Run], joint: Joint, value: float) -> InputError:
     """Return the error for runs in which a joint's torque never changes.
 
     Parameters
