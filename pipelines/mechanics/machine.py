@@ -95,9 +95,9 @@ class Machine:
         Parameters
         ----------
         source : Path or str
-            Begin of the message.
+            Start of the message.
         use : str
-            What needs every torque, as the begin of a sentence.
+            What needs every torque, as the start of a sentence.
 
         Raises
         ------

@@ -70,7 +70,7 @@ def test_bodies_exist_exactly_where_the_mass_matrix_is_positive_definite():
         if real:
             bodies(leg_of(X))
         else:
-            with pytest.raises(InputError, match="no real leg"):
+            with pytest.raises(InputError, match="not those of a real leg"):
                 leg_of(X)
     assert min(agreed.values()) > 10
 

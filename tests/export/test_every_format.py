@@ -171,7 +171,9 @@ def test_two_transmissions_of_one_joint_are_listed_though_no_simulation_holds_bo
 
 def test_a_leg_that_cannot_be_is_refused_with_the_reason():
     body = type(LEG[0])(LEG[0].effect, np.array([1.0, 0.9, 2.0, 5.0]))
-    with pytest.raises(InputError, match=r"no real leg: X2 \(X1 - X2\) = 0\.09 is not above"):
+    with pytest.raises(
+        InputError, match=r"not those of a real leg: X2 \(X1 - X2\) = 0\.09 is not above"
+    ):
         machine(body)
 
 

@@ -95,7 +95,7 @@ def _still(
             action = "it carries no information"
             if quantity == "angle" and not is_only_joint:
                 # Another log, or another import, may have runs in which it moves.
-                action += f"; {AT_REST}, or validate on a run in which it moves"
+                action += f"; validate on a run in which it moves, or {AT_REST}"
             if quantity == "torque" and not columns[name].any():
                 action += '; set drive = "none" in place of the table if the joint has no drive'
             yield Finding(name, f"is {columns[name][0]:.6g} in every row", action)
