@@ -541,3 +541,28 @@ def test_the_check_names_the_count_at_which_an_angle_starts_again(turntable):
     assert "angle leaps by 3600 counts" in text
     assert "set map.drive.plc.read.angle.wraps_at = 3600, and turns = true" in text
     assert findings_of(*turntable(", wraps_at = 3600")) == []
+
+
+@pytest.mark.parametrize(
+    ("kind", "negative", "expected"),
+    [
+        ("uint16", lambda m: 65536 - m, 'set map.drive.plc.read.torque.type = "int16"'),
+        ("uint16", lambda m: 32768 + m, "a magnitude with a sign bit"),
+        ("int16", lambda m: 32768 + m, "a magnitude with a sign bit"),
+        ("int16", lambda m: 65536 - m, ""),
+    ],
+)
+def test_a_sign_that_is_misread_is_named(tmp_path, kind, negative, expected):
+    def answer(n, words):
+        torque = round(200.0 * np.sin(0.2 * words[0] + 0.1))
+        return [words[0], 500, torque if torque >= 0 else negative(-torque)]
+
+    server, _ = a_device(answer)
+    path = tmp_path / "bench.toml"
+    text = BENCH.format(port=server.getsockname()[1], watchdog_s=1.0)
+    was = 'torque = { address = 2, type = "int16"'
+    assert was in text
+    path.write_text(text.replace(was, was.replace("int16", kind)))
+    texts = findings_of(path, server)
+    assert len(texts) == bool(expected)
+    assert all(expected in one and "torque leaps by" in one for one in texts)

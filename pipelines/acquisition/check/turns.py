@@ -1,11 +1,9 @@
-"""Whether an angle starts again after a turn, which the rig file does not say."""
+"""Whether an angle starts again after a turn, or a sign is misread, which no limit shows."""
 
 from collections.abc import Iterator
-from math import pi
-
-import numpy as np
 
 from pipelines.acquisition.check.finding import Finding
+from pipelines.acquisition.check.leaps import leap_of
 from pipelines.acquisition.check.probe import Probe, Series
 
 
@@ -19,28 +17,45 @@ def check_turns(probe: Probe, series: Series) -> Iterator[Finding]:
     series : Series
         Repeated readings of its block.
     """
-    register = series.block.registers.get("angle")
-    if register is None or register.turn or len(series.fresh) < 2:
-        return
-    per_count = abs(register.si[0])
-    counts = series.of("angle")[series.fresh] / per_count
-    steps = np.abs(np.diff(counts))
-    # A leap is half of all that the angle does; all else is small beside it.
-    leaps = steps > 0.5 * np.ptp(counts)
-    if not leaps.any() or leaps.all():
-        return
-    usual = float(steps[~leaps].max())
-    if usual > 0.125 * steps[leaps].min():
-        return
-    for full in (2.0 * pi / per_count, *(2.0**bits for bits in range(8, 33))):
-        if (np.abs(steps[leaps] - full) <= 2.0 * usual + 1.0).all():
-            where = f"{probe.map_path}.read.angle"
-            yield Finding(
-                probe.name,
-                f"angle leaps by {full:.10g} counts and goes on from there: it starts again after a"
-                f" turn; set {where}.wraps_at = {full:.10g}, and turns = true at the joint in"
-                " [mechanism]",
-                "angle",
-                is_explained=True,
+    full = leap_of(series, "angle", of_turn=True) if "angle" in series.block.names else None
+    if full is not None:
+        where = f"{probe.map_path}.read.angle"
+        yield Finding(
+            probe.name,
+            f"angle leaps by {full:.10g} counts and goes on from there: it starts again after a"
+            f" turn; set {where}.wraps_at = {full:.10g}, and turns = true at the joint in"
+            " [mechanism]",
+            "angle",
+            is_explained=True,
+        )
+
+
+def check_signs(probe: Probe, series: Series) -> Iterator[Finding]:
+    """Yield a finding for each value of one register that leaps where it changes its sign.
+
+    Parameters
+    ----------
+    probe : Probe
+        A device that is only read.
+    series : Series
+        Repeated readings of its block.
+    """
+    for name, register in series.block.registers.items():
+        if name in ("sequence", "time", "angle", "reference", "status") or register.registers > 1:
+            continue
+        full, where = leap_of(series, name), f"{probe.map_path}.read.{name}"
+        if full == 2.0**16 and register.is_unsigned:
+            remedy = f'negative values are read as large ones; set {where}.type = "int16"'
+        elif full == 2.0**15:
+            remedy = (
+                f"a magnitude with a sign bit, which no type of {where} reads; record another"
+                " register, or log it and import the log with sign_bit = 15"
             )
-            return
+        else:
+            continue
+        yield Finding(
+            probe.name,
+            f"{name} leaps by {full:.0f} counts where it changes its sign: {remedy}",
+            name,
+            is_explained=True,
+        )
