@@ -532,3 +532,17 @@ def test_commas_that_whole_numbers_below_1000_have_too_are_not(
     written = [f'"{round(1e3 * torque):,}"' for torque in pendulum.torque]
     written[77] = f'"{other}"'
     assert "rows with text" in imported(write_csv(pendulum.columns() | {"torque": written})).printed
+
+
+def test_rows_that_are_missing_do_not_hide_that_a_counter_wraps(imported, pendulum, write_csv):
+    columns = pendulum.columns()
+    written = columns | {"angle": np.round(6e4 * columns["angle"]).astype(int) % 65536}
+    # Half a register's range is travelled meanwhile.
+    kept = np.ones(len(pendulum.time), dtype=bool)
+    fast = int(np.argmax(np.abs(pendulum.velocity)))
+    moved = 6e4 * np.abs(pendulum.angle - pendulum.angle[fast])
+    kept[fast + 1 : fast + int(np.argmax(moved[fast:] > 3e4))] = False
+    path = write_csv({name: values[kept] for name, values in written.items()})
+    counts = MAP.replace('unit = "rad"', 'unit = "counts", counts_per_turn = 376991', 1)
+    outcome = imported(path, map_text=counts)
+    assert "set wraps_at = 65536" in outcome.printed, outcome
