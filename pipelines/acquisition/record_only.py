@@ -8,7 +8,7 @@ give the uncertainty of a row's time.
 import asyncio
 import logging
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +16,7 @@ import numpy as np
 
 from pipelines.acquisition.machine.read_only import ReadOnlyMachine, ReadOnlyRow
 from pipelines.acquisition.machine.torn_words import TornRows
+from pipelines.acquisition.machine.turns import LastingLeap
 from pipelines.acquisition.modbus.exclusive_access import exclusive_access
 from pipelines.acquisition.modbus.file_lock import locked
 from pipelines.acquisition.pacing import LEAN
@@ -98,7 +99,12 @@ def _refuse_other_joints(rig: RecordingRig, mechanism: MechanismSettings) -> Non
             f"drive: found joints {', '.join(recorded)}, expected those of [mechanism]:"
             f" {', '.join(joint.name for joint in expected)}"
         )
-    for joint in expected:
+    for recorded_joint, joint in zip(rig.drive, expected, strict=True):
+        if rig.map.drive[recorded_joint.map].read.angle.turn and not joint.turns:
+            raise SettingsError(
+                f"drive: the angle of {joint.name} has wraps_at; set turns = true at that joint in"
+                " [mechanism]"
+            )
         if joint.kind != "revolute":
             raise SettingsError(
                 f"drive: {joint.name} slides, and only turning joints are recorded; use"
@@ -185,6 +191,7 @@ class _Recorder:
         number, fault = -1, None
         long = machine.long_integers()
         torn = TornRows[list[float]](list(long), list(long.values()))
+        leaps = {at: LastingLeap() for at in machine.angles_that_go_on()}
         while number < self._planned - 1:
             await pace.wait()
             if self._stopped_by:
@@ -198,7 +205,9 @@ class _Recorder:
                 if at > number:
                     number, answered_at, fault = at, time.monotonic(), None
                     if number < self._planned:
-                        self._write(row, number, seconds, torn, journal)
+                        for whole in self._whole(row, number, seconds, torn):
+                            _refuse_leap(whole, leaps, machine)
+                            journal.append(whole)
             now = time.monotonic()
             if now - answered_at > self._watchdog_s:
                 raise self._expired(now - answered_at, fault, machine)
@@ -206,19 +215,14 @@ class _Recorder:
                 reported_at = now
                 self._report((number + 1) / self._rate_hz, journal.rows)
 
-    def _write(
-        self,
-        row: ReadOnlyRow,
-        number: int,
-        seconds: float,
-        torn: TornRows[list[float]],
-        journal: Journal,
-    ) -> None:
-        """Write the rows that are known to be whole once this one has come."""
+    def _whole(
+        self, row: ReadOnlyRow, number: int, seconds: float, torn: TornRows[list[float]]
+    ) -> list[list[float]]:
+        """Return the rows that are known to be whole once this one has come."""
         self._widths.append(row.answered - row.asked)
-        for whole in torn.take([seconds, *row.values, number], number, row.values):
-            journal.append(whole)
+        whole = torn.take([seconds, *row.values, number], number, row.values)
         self._torn_rows = torn.torn
+        return whole
 
     def _expired(
         self, waited_s: float, fault: DeviceError | None, machine: ReadOnlyMachine
@@ -246,6 +250,20 @@ class _Recorder:
             "uncertainty_p99_s": p99,
             "uncertainty_longest_s": longest,
         }
+
+
+def _refuse_leap(
+    row: Sequence[float], leaps: Mapping[int, LastingLeap], machine: ReadOnlyMachine
+) -> None:
+    """End a recording in which an angle has started again, which the rig file does not say."""
+    for at, lasting in leaps.items():
+        leap = lasting.take(int(row[-1]), row[1 + at])
+        if leap is not None:
+            raise DeviceError(
+                f"{machine.columns[at]} leaps by {leap:.4g} rad from one row to the next and goes"
+                " on from there: its register starts again after a turn; set read.angle.wraps_at"
+                " in the rig file, in counts, and turns = true in [mechanism]"
+            )
 
 
 class _HostPace:

@@ -29,8 +29,8 @@ def as_written(column: pd.Series, decimal: str) -> pd.Series:
 def have_thousands(texts: pd.Series, decimal: str) -> bool:
     """Return whether numbers have marks between their thousands: commas, or points.
 
-    All numbers with such a mark must be of this kind, and one of them must have a decimal point.
-    Without it the mark may be a decimal one.
+    All numbers with such a mark must be of this kind. One of them must have a decimal point, too,
+    or the mark stand in each number from 1000 on, and in none below.
     """
     mark = "," if decimal == "." else "."
     digits = r"[-+\d.,]+"
@@ -39,6 +39,22 @@ def have_thousands(texts: pd.Series, decimal: str) -> bool:
         [text for text in texts if isinstance(text, str) and mark in text], dtype=str
     )
     marked = marked[marked.str.fullmatch(digits)]
-    return bool(marked.str.contains(decimal, regex=False).any()) and bool(
-        marked.str.fullmatch(thousands).all()
+    if marked.empty or not marked.str.fullmatch(thousands).all():
+        return False
+    return bool(marked.str.contains(decimal, regex=False).any()) or _are_counted(
+        len(marked), [str(one).strip() for one in texts if pd.notna(one) and mark not in str(one)]
+    )
+
+
+def _are_counted(marked: int, others: list[str]) -> bool:
+    """Return whether numbers below 1000 are whole and have no mark, though many from 1000 on have.
+
+    A logger that writes a decimal mark writes it in nearly all numbers, and in those below 1, too.
+    """
+    enough = 10  # numbers of each kind
+    plain = [text for text in others if re.fullmatch(r"[-+]?\d+([.,]\d*)?", text)]
+    return (
+        marked >= enough
+        and len(plain) >= enough
+        and all(re.fullmatch(r"[-+]?\d{1,3}", text) for text in plain)
     )

@@ -483,3 +483,86 @@ def test_a_gateway_that_answers_as_unit_1_alone_is_never_advised_for_two_devices
     of_hip = [one.text for one in report.findings if one.device == "drive hip"]
     assert len(of_hip) == (units[0] != 1)
     assert all("correct unit" in text for text in of_hip)
+
+
+def a_turntable():
+    """Serve a counter, and an angle in tenths of a degree that turns by 14 rad/s, from 0 again."""
+
+    def answer(n, words):
+        return [words[0], words[0] * 80 % 3600, 20]
+
+    return a_device(answer)
+
+
+TURNING = MechanismSettings.model_validate(
+    {"joints": [{"name": "elbow", "kind": "revolute", "turns": True}]}
+)
+
+
+@pytest.fixture
+def turntable(tmp_path):
+    def write(wraps_at=""):
+        server, _ = a_turntable()
+        path = tmp_path / "turntable.toml"
+        text = BENCH.format(port=server.getsockname()[1], watchdog_s=1.0)
+        wrong = 'scale = 1e-3, unit = "rad"'
+        assert wrong in text
+        path.write_text(text.replace(wrong, f'scale = 0.1, unit = "deg"{wraps_at}'))
+        return path, server
+
+    return write
+
+
+def test_the_turns_of_a_joint_without_end_are_counted(turntable, tmp_path):
+    path, server = turntable(", wraps_at = 3600")
+    output = tmp_path / "turntable.parquet"
+    settings = RunSettings(name="one", run="exo_alone", purpose="train", duration_s=2.5)
+    with server:
+        with pytest.raises(SettingsError, match=r"set turns = true at that joint"):
+            record_only(path, settings, output, 100.0, ELBOW)
+        record_only(path, settings, output, 100.0, TURNING)
+    frame = RECORDING.read(output).frame
+    turned = np.radians(8.0) * (frame["sequence"] - frame["sequence"].iloc[0])
+    assert turned.iloc[-1] > 4.0 * np.pi, "more than a recording of another joint holds"
+    angle = frame["elbow_angle_rad"]
+    assert np.allclose(angle - angle.iloc[0], turned, atol=1e-6)
+
+
+def test_an_angle_that_starts_again_is_never_recorded_as_a_leap(turntable, tmp_path):
+    path, server = turntable()
+    settings = RunSettings(name="one", run="exo_alone", purpose="train", duration_s=3.0)
+    with server, pytest.raises(DeviceError, match=r"elbow_angle_rad leaps .*wraps_at"):
+        record_only(path, settings, tmp_path / "turntable.parquet", 100.0, ELBOW)
+    assert not (tmp_path / "turntable.parquet").exists()
+
+
+def test_the_check_names_the_count_at_which_an_angle_starts_again(turntable):
+    (text,) = findings_of(*turntable())
+    assert "angle leaps by 3600 counts" in text
+    assert "set map.drive.plc.read.angle.wraps_at = 3600, and turns = true" in text
+    assert findings_of(*turntable(", wraps_at = 3600")) == []
+
+
+@pytest.mark.parametrize(
+    ("kind", "negative", "expected"),
+    [
+        ("uint16", lambda m: 65536 - m, 'set map.drive.plc.read.torque.type = "int16"'),
+        ("uint16", lambda m: 32768 + m, "a magnitude with a sign bit"),
+        ("int16", lambda m: 32768 + m, "a magnitude with a sign bit"),
+        ("int16", lambda m: 65536 - m, ""),
+    ],
+)
+def test_a_sign_that_is_misread_is_named(tmp_path, kind, negative, expected):
+    def answer(n, words):
+        torque = round(200.0 * np.sin(0.2 * words[0] + 0.1))
+        return [words[0], 500, torque if torque >= 0 else negative(-torque)]
+
+    server, _ = a_device(answer)
+    path = tmp_path / "bench.toml"
+    text = BENCH.format(port=server.getsockname()[1], watchdog_s=1.0)
+    was = 'torque = { address = 2, type = "int16"'
+    assert was in text
+    path.write_text(text.replace(was, was.replace("int16", kind)))
+    texts = findings_of(path, server)
+    assert len(texts) == bool(expected)
+    assert all(expected in one and "torque leaps by" in one for one in texts)

@@ -263,15 +263,16 @@ def test_a_factor_in_a_name_is_given_with_the_keys_to_set(guessed, pendulum, wri
     assert "its name says '0.1 Nm': set unit and scale" in doubts["joint[0].torque.unit"]
 
 
-def test_a_unit_that_no_map_has_is_quoted_and_no_joints_name(guessed, pendulum, write_csv):
+@pytest.mark.parametrize("gon", ["gon", "grad"])
+def test_a_unit_that_no_map_has_is_quoted_and_no_joints_name(guessed, pendulum, write_csv, gon):
     columns = {
         "time": pendulum.time,
-        "phi [gon]": 200.0 / np.pi * pendulum.angle,
+        f"phi [{gon}]": 200.0 / np.pi * pendulum.angle,
         "M [oz-in]": 141.6 * pendulum.torque,
     }
     text, doubts = guessed(write_csv(columns))
     assert tomllib.loads(text)["joint"][0]["name"] == "joint"
-    assert "its name says 'gon'" in doubts["joint[0].angle.unit"]
+    assert f"its name says {gon!r}" in doubts["joint[0].angle.unit"]
     assert "its name says 'oz-in'" in doubts["joint[0].torque.unit"]
 
 

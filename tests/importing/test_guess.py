@@ -1031,3 +1031,25 @@ def test_what_slides_is_taken_for_level_by_the_guess(guessed, pendulum, write_cs
     )
     assert tomllib.loads(text)["geometry"] == {"gravity_m_s2": 0.0}
     assert "of a lift" in doubts["geometry.gravity_m_s2"]
+
+
+def test_two_clocks_side_by_side_that_no_name_tells_each_get_their_channels(
+    imported, guessed, pendulum, write_csv
+):
+    # Time, angle and torque of two loggers; the slower one's columns end at a quarter of the rows.
+    slow = slice(0, None, 4)
+    ended = {"lc_s": pendulum.time[slow], "lc_Nm": pendulum.torque[slow]}
+    blank = [""] * (len(pendulum.time) - len(ended["lc_s"]))
+    columns = {"enc_ms": 1e3 * pendulum.time, "enc_deg": np.degrees(pendulum.angle)}
+    columns |= {name: [*values, *blank] for name, values in ended.items()}
+    path = write_csv(columns)
+    text, doubts = guessed(path)
+    map_ = tomllib.loads(text)
+    assert map_["time"]["column"] == "lc_s" and "time.column" in doubts
+    assert map_["joint"][0]["angle"]["column"] == "enc_deg"
+    assert map_["joint"][0]["angle"]["time"] == "enc_ms"
+    assert map_["joint"][0]["torque"]["column"] == "lc_Nm"
+    frame = imported(path, map_text=text).recording("log_train").frame
+    rows = len(frame)
+    assert_allclose(frame.filter(like="angle").iloc[:, 0], pendulum.angle[slow][:rows], atol=1e-9)
+    assert_allclose(frame.filter(like="torque").iloc[:, 0], pendulum.torque[slow][:rows], atol=1e-9)

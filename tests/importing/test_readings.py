@@ -509,3 +509,40 @@ def test_a_comma_that_may_be_a_decimal_one_is_not_taken_for_one_between_thousand
     path.write_text("\n".join(["time,angle,velocity,torque", *lines]))
     outcome = imported(path)
     assert outcome.code == 2 and "torque" in outcome.err
+
+
+def test_commas_in_whole_numbers_from_1000_on_alone_are_between_thousands(
+    imported, pendulum, write_csv
+):
+    written = [f'"{round(1e3 * torque):,}"' for torque in pendulum.torque]
+    assert 300 < sum("," in text for text in written) < 1900
+    outcome = imported(
+        write_csv(pendulum.columns() | {"torque": written}),
+        map_text=MAP.replace('unit = "N·m"', 'unit = "mN·m"'),
+    )
+    assert "torque: commas between thousands; read without them" in outcome.printed
+    frame = outcome.recording().frame
+    assert_allclose(frame["pivot_torque_nm"], np.round(pendulum.torque, 3), atol=1e-9)
+
+
+@pytest.mark.parametrize("other", ["0,5", "12,3456", "7.5", "1234"])
+def test_commas_that_whole_numbers_below_1000_have_too_are_not(
+    imported, pendulum, write_csv, other
+):
+    written = [f'"{round(1e3 * torque):,}"' for torque in pendulum.torque]
+    written[77] = f'"{other}"'
+    assert "rows with text" in imported(write_csv(pendulum.columns() | {"torque": written})).printed
+
+
+def test_rows_that_are_missing_do_not_hide_that_a_counter_wraps(imported, pendulum, write_csv):
+    columns = pendulum.columns()
+    written = columns | {"angle": np.round(6e4 * columns["angle"]).astype(int) % 65536}
+    # Half a register's range is travelled meanwhile.
+    kept = np.ones(len(pendulum.time), dtype=bool)
+    fast = int(np.argmax(np.abs(pendulum.velocity)))
+    moved = 6e4 * np.abs(pendulum.angle - pendulum.angle[fast])
+    kept[fast + 1 : fast + int(np.argmax(moved[fast:] > 3e4))] = False
+    path = write_csv({name: values[kept] for name, values in written.items()})
+    counts = MAP.replace('unit = "rad"', 'unit = "counts", counts_per_turn = 376991', 1)
+    outcome = imported(path, map_text=counts)
+    assert "set wraps_at = 65536" in outcome.printed, outcome

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from pipelines.acquisition.check.finding import Finding
 from pipelines.acquisition.check.interpretation import remedy
 from pipelines.acquisition.check.probe import Probe, Series
+from pipelines.acquisition.check.turns import check_signs, check_turns
 from pipelines.acquisition.check.words import check_words
 from pipelines.acquisition.machine.drive import Drive
 from pipelines.contracts.checks import LARGEST_ANGLE_RAD
@@ -110,9 +111,14 @@ def check_registers(
     elif isinstance(rig, RigSettings):
         expected = _of_sensor(rig)
     else:  # a machine that moves by itself may be anywhere that a recording holds
-        expected = dict.fromkeys(("angle", "reference"), _ANYWHERE)
+        turns = "angle" in series.block.names and series.block.registers["angle"].turn
+        expected = {} if turns else dict.fromkeys(("angle", "reference"), _ANYWHERE)
     yield from _check_counter_words(probe, series)
     findings = list(check_words(probe, series, order=isinstance(rig, RecordingRig)))
+    if isinstance(rig, RecordingRig):
+        if not any(one.quantity == "angle" for one in findings):
+            findings += check_turns(probe, series)
+        findings += check_signs(probe, series)
     yield from findings
     misread = {finding.quantity for finding in findings}
     for name in series.block.names:

@@ -98,6 +98,8 @@ class Series:
         if bytes_swapped:
             words = (words >> 8) | ((words & 0xFF) << 8)
         values = [one.decode(row)[name] for row in words.tolist()]
+        if register.turn:
+            values = list(map(Unwrapper(register.turn), values))
         if counts:
             # By the span of the register under test: another type wraps around elsewhere.
             values = list(map(Unwrapper(one.modulus(name)), values))

@@ -8,10 +8,12 @@ from math import isfinite
 
 from pipelines.acquisition.machine.machine import all_answers
 from pipelines.acquisition.machine.progress import Progress
+from pipelines.acquisition.machine.turns import FollowedAngle
 from pipelines.acquisition.modbus.blocks import BlockReader
 from pipelines.acquisition.modbus.device import Device
 from pipelines.acquisition.modbus.line import Line, lines_of
 from pipelines.acquisition.modbus.one_client import greet
+from pipelines.acquisition.modbus.wraparound import unwrap
 from pipelines.contracts.checks import LARGEST_ANGLE_RAD
 from pipelines.contracts.joints import Joint
 from pipelines.errors import DeviceError
@@ -39,6 +41,9 @@ class ReadOnlyPart:
         line.reopens = True
         self.device = Device(name, settings.unit, line, rig.safety)
         self.reader = BlockReader(self.device, self.map.read)
+        angle = self.reader.block.registers.get("angle")
+        self._turn = angle.turn if angle else 0.0
+        self._followed = FollowedAngle(self._turn)
 
     async def begin(self, earlier: Sequence[Device]) -> None:
         """Connect, check its identity, and read it once.
@@ -74,12 +79,15 @@ class ReadOnlyPart:
                     f"{self.device.label}: its {name} is {value}, expected a number; compare the"
                     " register map in the rig file with the device's manual"
                 )
-            if name in ("angle", "reference") and abs(value) > LARGEST_ANGLE_RAD:
+            is_angle = name in ("angle", "reference")
+            if is_angle and not self._turn and abs(value) > LARGEST_ANGLE_RAD:
                 raise DeviceError(
                     f"{self.device.label}: its {name} is {value:.4g} rad, and a recording holds at"
                     f" most {LARGEST_ANGLE_RAD:.4g}; `exoid rig check` tries other addresses, types"
                     " and word orders"
                 )
+        if self._turn:
+            values |= self._with_turns(values)
         settings = self.settings
         if isinstance(settings, RecordedJoint) and "torque" not in values:
             # The rig file is checked: a current comes with both.
@@ -88,6 +96,19 @@ class ReadOnlyPart:
                 values["current"] * settings.torque_constant_nm_a * settings.gear_ratio
             )
         return values
+
+    def _with_turns(self, values: Mapping[str, float]) -> dict[str, float]:
+        """Return the angle with its turns, and the set-point near it."""
+        angle = self._followed.take(values["angle"], time.perf_counter())
+        if angle is None:
+            raise DeviceError(
+                f"{self.device.label}: its angle is over a quarter of a turn from where its speed"
+                " leads, so that its turns cannot be counted; raise acquire.sample_rate_hz, or"
+                " correct read.angle.wraps_at"
+            )
+        if "reference" not in values:
+            return {"angle": angle}
+        return {"angle": angle, "reference": unwrap(values["reference"], angle, self._turn)}
 
 
 @dataclass(frozen=True)
@@ -141,6 +162,14 @@ class ReadOnlyMachine:
             for at, one in enumerate(registers)
             if one is not None and one.counts is not None and one.registers > 1
         }
+
+    def angles_that_go_on(self) -> list[int]:
+        """Return the indices of the angles in a row that do not start again after a turn."""
+        return [
+            at
+            for at, (k, quantity, _) in enumerate(self._picked)
+            if quantity == "angle" and not self.parts[k].reader.block.registers[quantity].turn
+        ]
 
     @property
     def columns(self) -> list[str]:

@@ -1,6 +1,6 @@
 """The rows of a journal that a recording may hold; the others are left out as gaps."""
 
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 
 import numpy as np
 import pyarrow as pa
@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from pipelines.acquisition.modbus.wraparound import keeps_time
 from pipelines.acquisition.recording.journal_file import Batch, JournalFile
 from pipelines.contracts.checks import LARGEST_ANGLE_RAD
+from pipelines.contracts.joints import joints_of
 
 
 def valid_batches(journal: JournalFile) -> Iterator[Batch]:
@@ -21,16 +22,21 @@ def valid_batches(journal: JournalFile) -> Iterator[Batch]:
         # Its rows were compared with this computer's clock as they came. Their times are those of
         # the answers, which on a slow line come more than half a sample late.
         rate_hz = None
+    turning = {joint.name for joint in joints_of(journal.metadata) if joint.turns}
     for batch in journal.batches():
-        is_valid, last = _in_time(batch.rows, _are_possible(batch.rows), rate_hz, last)
+        possible = _are_possible(batch.rows, turning)
+        is_valid, last = _in_time(batch.rows, possible, rate_hz, last)
         if is_valid.all():
             yield batch
         else:
             yield Batch(batch.rows.filter(pa.array(is_valid)), batch.last_words)
 
 
-def _are_possible(rows: pa.RecordBatch) -> NDArray:
-    """Mark the rows (n,) that have only values which a recording may hold."""
+def _are_possible(rows: pa.RecordBatch, turning: Collection[str]) -> NDArray:
+    """Mark the rows (n,) that have only values which a recording may hold.
+
+    Angles of the ``turning`` joints may be of any number of turns.
+    """
     # Endings of the columns that hold a number in every row.
     always_measured = ("_angle_rad", "_torque_nm")
     possible = np.ones(rows.num_rows, bool)
@@ -41,7 +47,8 @@ def _are_possible(rows: pa.RecordBatch) -> NDArray:
         else:
             # NaN is a value that was not measured, as a force between two readings.
             possible &= ~np.isinf(values)
-        if name.endswith("_rad"):
+        has_limit = name.removesuffix("_angle_rad").removesuffix("_reference_rad") not in turning
+        if name.endswith("_rad") and has_limit:
             possible &= ~(np.abs(values) > LARGEST_ANGLE_RAD)
     return possible
 

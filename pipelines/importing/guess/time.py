@@ -124,8 +124,15 @@ def guess_time(
     for meaning in sorted(candidates, key=lambda m: m.unit is None):
         guess = _guess(meaning, columns[meaning.column].astype(float), meaning in coarse, typed)
         if guess is not None:
-            # A slower clock of a table ends before the others, or is blank in rows between.
-            partial = [m for m in meanings if m not in named and _advances_in_its_rows(m, columns)]
+            # A slower clock of a table ends before the others, or is blank in rows between. Where
+            # no name says time, its own does not, either.
+            partial = [
+                m
+                for m in meanings
+                if m not in named
+                and (m.quantity == "time" or not (named or m.quantity))
+                and _advances_in_its_rows(m, columns)
+            ]
             clocks = [(m.column, _unit(m, typed) or guess.unit) for m in named + coarse + partial]
             return replace(guess, rivals=tuple(_rivals(guess, clocks, columns)))
     return None
@@ -393,7 +400,7 @@ def write_time(proposal: Proposal, guess: TimeGuess, held: Sequence[str]) -> Non
     why = "goes forward"
     if guess.wraps_at or guess.restarts:
         why += ", but starts over"
-    if not guess.sure:
+    if not guess.sure and not guess.rivals:
         why += ", as no other does"
     if guess.is_slowest:
         why += ", the slowest clock of an angle or torque"
@@ -433,9 +440,9 @@ def _advances(values: NDArray, is_named: bool) -> bool:
 
 
 def _advances_in_its_rows(meaning: Meaning, columns: Mapping[str, NDArray]) -> bool:
-    """Return whether a column named as a clock increases, with blanks in some rows."""
+    """Return whether a column increases, with blanks in some rows."""
     values = columns[meaning.column]
-    if meaning.quantity != "time" or values.dtype.kind != "f":
+    if values.dtype.kind != "f":
         return False
     known = np.isfinite(values)
     return not known.all() and _advances(values[known], is_named=True)

@@ -31,7 +31,7 @@ OTHERS = (
 )
 """Units of quantities that no map has."""
 FOREIGN = {
-    **dict.fromkeys(("gon", "mgon", "arcmin", "arcsec", "ft"), "angle"),
+    **dict.fromkeys(("gon", "grad", "mgon", "arcmin", "arcsec", "ft"), "angle"),
     **dict.fromkeys(("gon/s", "deg/min", "°/min", "rad/min", "rev/h"), "velocity"),
     **dict.fromkeys(("m/min", "mm/min", "in/min", "ft/s", "km/h", "mph"), "velocity"),
     **dict.fromkeys(
@@ -73,7 +73,8 @@ def unit_in(name: str) -> UnitInName | None:
     # Brackets first: a unit in them is one for sure, elsewhere the same letters may be a word.
     for bracket in BRACKETS.finditer(name):
         text = bracket[1].strip()
-        unit = None if text in OTHERS else _written(text)
+        # "grad" is a gon, and "Grad" a degree: units of no map come before those but for case.
+        unit = None if text in OTHERS or text in FOREIGN else _written(text)
         if (unit or text in OTHERS) and not FACTOR.search(_without(name, bracket)):
             return UnitInName(_without(name, bracket), unit, decides=True)
     return _with_factor(name) or _outside_of_brackets(name)

@@ -31,10 +31,23 @@ class RecordedJoint(DeviceSettings):
     gear_ratio: Positive | None = Field(None, description="Motor turns per turn of the joint.")
 
 
+class RecordedAngle(Register):
+    """The angle of a joint, which may start again after each turn."""
+
+    wraps_at: Positive | None = Field(
+        None, description="Count at which it starts again at 0: 3600 in tenths of a degree."
+    )
+
+    @property
+    def turn(self) -> float:
+        """SI value after which it starts again at 0; 0 where it goes on."""
+        return abs(self.si[0]) * (self.wraps_at or 0.0)
+
+
 class RecordedRead(ReadBlock):
     """Values of a joint; without a counter or clock, this computer's clock counts."""
 
-    angle: Register = Field(description="Joint angle.")
+    angle: RecordedAngle = Field(description="Joint angle.")
     torque: Register | None = Field(None, description="Torque at the joint; or current.")
     current: Register | None = Field(None, description="Motor current; or torque.")
     sequence: Register | None = Field(None, description="Sample counter.")

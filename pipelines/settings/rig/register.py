@@ -114,6 +114,11 @@ class Register(Settings):
         return 0.0 if self.counts is None else abs(self.si[0])
 
     @property
+    def turn(self) -> float:
+        """SI value after which it starts again at 0, though its type could go on; else 0."""
+        return 0.0
+
+    @property
     def is_unsigned(self) -> bool:
         """Whether it is a count from 0, which wraps around."""
         return STRUCT_CODES[self.type].isupper()
