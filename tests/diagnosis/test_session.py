@@ -66,8 +66,8 @@ def test_a_constant_angle_is_reported_as_constant(motions):
     assert (
         str(refused.value)
         == "run_0.parquet: the angle of the knee is -0.5 rad in every row, expected a joint that"
-        " moves; check its encoder, and which channel the map reads; for a joint that rests set"
-        ' drive = "unmeasured" if its angle matters, or leave it out'
+        " moves; check its encoder, and which channel the map reads; for a joint that rests in all"
+        ' runs set drive = "unmeasured" if its angle matters, or leave it out'
     )
 
 
