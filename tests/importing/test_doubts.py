@@ -8,6 +8,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 from exoid_cli.app import run
+from pipelines.importing.guess.names import meaning
 from pipelines.importing.guess.torque import fit_torque
 from pipelines.importing.quantities.wraparound import fill_value, full_at, sign_bit
 from tests.importing.test_guess import guessed
@@ -242,6 +243,8 @@ def test_an_angle_that_is_blank_where_the_torque_is_logged_is_interpolated(
         ("Position_deg_x100", "Torque_Nm_x10"),
         ("Position [1e-2 deg]", "Torque [dNm]"),
         ("Position_cdeg", "Torque_dNm"),
+        ("Position [pi rad]", "Torque [kilo Nm]"),
+        ("Position_half_turns", "Torque [tenths of Nm]"),
     ],
 )
 def test_a_unit_with_a_factor_or_a_prefix_is_not_read_as_the_unit_alone(
@@ -274,6 +277,20 @@ def test_a_unit_that_no_map_has_is_quoted_and_no_joints_name(guessed, pendulum, 
     assert tomllib.loads(text)["joint"][0]["name"] == "joint"
     assert f"its name says {gon!r}" in doubts["joint[0].angle.unit"]
     assert "its name says 'oz-in'" in doubts["joint[0].torque.unit"]
+
+
+@pytest.mark.parametrize("name", ["winkel_grad", "winkel [Grad]"])
+def test_grad_in_lower_case_is_a_degree_in_doubt(guessed, pendulum, write_csv, name):
+    columns = {"time": pendulum.time, name: np.degrees(pendulum.angle), "tau_Nm": pendulum.torque}
+    text, doubts = guessed(write_csv(columns))
+    assert tomllib.loads(text)["joint"][0]["angle"]["unit"] == "deg"
+    assert ("gon" in doubts.get("joint[0].angle.unit", "")) == (name == "winkel_grad")
+
+
+@pytest.mark.parametrize("name", ["tau_PI [Nm]", "pi_controller_torque [Nm]", "half_angle [rad]"])
+def test_a_word_before_no_unit_is_no_factor(name):
+    column = meaning(name)
+    assert column.unit and not column.unread
 
 
 @pytest.mark.parametrize("begin", ["2026-03-04 12:00:00", "2026-03-04 23:59:57"])

@@ -107,6 +107,8 @@ class Meaning:
     measured: bool
     unread: str = ""
     """Text of a unit in the name that no map has, such as ``0.1 Nm``."""
+    doubt: str = ""
+    """Another meaning that the unit in the name may have."""
 
     @property
     def rank(self) -> int:
@@ -157,6 +159,7 @@ def meaning(name: str) -> Meaning:
         filtered=bool(distinct & FILTERED),
         measured=bool(distinct & MEASURED),
         unread=in_name.unread if in_name else "",
+        doubt=in_name.doubt if in_name and unit else "",
     )
 
 

@@ -333,7 +333,8 @@ def settled(
             if any(
                 abs(factor - 1.0) < EXACT for factor in factors(slope, angle.unit, velocity.unit)
             ):
-                named = guess.sure and bool(angle.unit and velocity.unit)
+                doubted = angle.doubt or velocity.doubt
+                named = guess.sure and bool(angle.unit and velocity.unit) and not doubted
                 why = f"{guess.why}; in {scale:g} {unit} the velocity integrates to the angle"
                 return replace(guess, unit=unit, scale=scale, why=why, unit_sure=named)
     return guess

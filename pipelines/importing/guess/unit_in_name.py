@@ -32,7 +32,7 @@ OTHERS = (
 """Units of quantities that no map has."""
 FOREIGN = {
     **dict.fromkeys(("gon", "grad", "mgon", "arcmin", "arcsec", "ft"), "angle"),
-    **dict.fromkeys(("gon/s", "deg/min", "°/min", "rad/min", "rev/h"), "velocity"),
+    **dict.fromkeys(("gon/s", "grad/s", "deg/min", "°/min", "rad/min", "rev/h"), "velocity"),
     **dict.fromkeys(("m/min", "mm/min", "in/min", "ft/s", "km/h", "mph"), "velocity"),
     **dict.fromkeys(
         ("kgf·m", "kgf*m", "kgf.m", "kgfm", "kpm", "kp·m", "dyn·cm", "gf·cm"), "torque"
@@ -44,8 +44,15 @@ FOREIGN = {
 }
 """Units in brackets that no map has, and the quantity that is measured in them."""
 BRACKETS = re.compile(r"[\[({<]([^\])}>]*)[\])}>]")
-FACTOR = re.compile(r"(?<![^\W_])[x×*/] ?10+(?![\d.])|(?<!\d)10 ?\^ ?-?\d+|\d*\.\d+(?= ?[^\W\d_])")
-"""A factor next to a unit outside of brackets: ``x10``, ``/100``, ``10^-3``, ``0.1 Nm``."""
+FACTOR = re.compile(
+    r"(?<![^\W_])[x×*/] ?10+(?![\d.])|(?<!\d)10 ?\^ ?-?\d+|\d*\.\d+(?= ?[^\W\d_])"
+    # As words only before a unit: pi is also a kind of controller.
+    r"|(?<![^\W\d_])(?i:pi|π|half|tenths?|hundredths?|thousandths?|kilo|milli|micro)"
+    r"(?:[\s_·*-]|of)*(?=(?i:rad|deg|grad|rev|turn|Nm|N[·*. _]m|newton|amp|volt)|[°ANV](?![^\W_]))"
+)
+"""A factor next to a unit: ``x10``, ``/100``, ``10^-3``, ``0.1 Nm``, ``pi rad``."""
+GRAD = "in lower case grad may be a gon, 0.9 degrees"
+"""Doubt about the German word for a degree."""
 
 
 @dataclass(frozen=True)
@@ -59,6 +66,8 @@ class UnitInName:
     """Whether it determines the quantity; a letter or a word may mean something else."""
     unread: str = ""
     """Text of a unit that no map has, or of one with a factor: ``0.1 Nm``."""
+    doubt: str = ""
+    """Another meaning that the unit may have."""
 
     @property
     def quantity(self) -> str:
@@ -87,7 +96,9 @@ def _with_factor(name: str) -> UnitInName | None:
         known = text in OTHERS or _written(text)
         if text in FOREIGN:
             return UnitInName(_without(name, bracket), None, decides=True, unread=text)
-        has_factor = re.search(r"\d", text) and (_WORD.search(text) or "%" in text)
+        has_factor = FACTOR.search(text) or (
+            re.search(r"\d", text) and (_WORD.search(text) or "%" in text)
+        )
         is_product = re.search(r"[^\W\d_]\s*[*·/^]\s*\w", text)
         if not known and (has_factor or is_product):
             word = None if is_product else _WORD.search(text)
@@ -112,7 +123,8 @@ def _outside_of_brackets(name: str) -> UnitInName | None:
     last = matches[-1]
     unit = _written(last[0])
     decides = last.re is _WORD and (unit is None or _is_plain(last[0], unit))
-    return UnitInName(_without(name, last), unit, decides)
+    doubt = GRAD if last[0].startswith("grad") and unit in ("deg", "deg/s") else ""
+    return UnitInName(_without(name, last), unit, decides, doubt=doubt)
 
 
 def _without(name: str, match: re.Match[str]) -> str:
