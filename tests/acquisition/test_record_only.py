@@ -190,13 +190,13 @@ ELBOW = MechanismSettings.model_validate({"joints": [{"name": "elbow", "kind": "
 def record_bench(tmp_path):
     """Record a device for 0.8 s; return the rows. Nothing may be written to it."""
 
-    def run(answer, most_answers=10**9, rate_hz=100.0, watchdog_s=0.6):
+    def run(answer, most_answers=10**9, rate_hz=100.0, watchdog_s=0.6, mechanism=ELBOW):
         server, asked = a_device(answer, most_answers)
         path, output = tmp_path / "bench.toml", tmp_path / "bench.parquet"
         path.write_text(BENCH.format(port=server.getsockname()[1], watchdog_s=watchdog_s))
         settings = RunSettings(name="one", run="exo_alone", purpose="train", duration_s=0.8)
         with server:
-            record_only(path, settings, output, rate_hz, ELBOW)
+            record_only(path, settings, output, rate_hz, mechanism)
         assert asked == {3}
         return RECORDING.read(output).frame
 
@@ -526,6 +526,16 @@ def test_the_turns_of_a_joint_without_end_are_counted(turntable, tmp_path):
     assert turned.iloc[-1] > 4.0 * np.pi, "more than a recording of another joint holds"
     angle = frame["elbow_angle_rad"]
     assert np.allclose(angle - angle.iloc[0], turned, atol=1e-6)
+
+
+def test_a_multi_turn_register_is_recorded_beyond_one_turn(record_bench):
+    def answer(n, words):
+        return [words[0], 12000 + words[0] * 50, 20]
+
+    with pytest.raises(DeviceError, match="joint without end needs turns = true"):
+        record_bench(answer)
+    angle = record_bench(answer, mechanism=TURNING)["elbow_angle_rad"]
+    assert angle.iloc[0] > 12.0 and angle.iloc[-1] > angle.iloc[0] + 2.0
 
 
 def test_an_angle_that_starts_again_is_never_recorded_as_a_leap(turntable, tmp_path):
