@@ -576,3 +576,24 @@ def test_a_sign_that_is_misread_is_named(tmp_path, kind, negative, expected):
     texts = findings_of(path, server)
     assert len(texts) == bool(expected)
     assert all(expected in one and "torque leaps by" in one for one in texts)
+
+
+def test_a_torque_of_magnitude_and_sign_bit_is_recorded_and_has_no_findings(tmp_path):
+    def answer(n, words):
+        torque = round(200.0 * np.sin(0.2 * words[0] + 0.1))
+        return [words[0], 500, torque if torque >= 0 else 32768 - torque]
+
+    path, output = tmp_path / "bench.toml", tmp_path / "bench.parquet"
+    for act in ("check", "record"):
+        server, _ = a_device(answer)
+        text = BENCH.format(port=server.getsockname()[1], watchdog_s=1.0)
+        was = 'torque = { address = 2, type = "int16"'
+        path.write_text(text.replace(was, f"{was.replace('int16', 'uint16')}, sign_bit = 15"))
+        if act == "check":
+            assert findings_of(path, server) == []
+            continue
+        settings = RunSettings(name="one", run="exo_alone", purpose="train", duration_s=0.8)
+        with server:
+            record_only(path, settings, output, 100.0, ELBOW)
+    torque = RECORDING.read(output).frame["elbow_torque_nm"]
+    assert -20.0 <= torque.min() < -15.0 and 15.0 < torque.max() <= 20.0
