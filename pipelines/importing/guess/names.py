@@ -5,7 +5,13 @@ import unicodedata
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
-from pipelines.importing.guess.unit_in_name import BRACKETS, QUANTITIES, UnitInName, unit_in
+from pipelines.importing.guess.unit_in_name import (
+    BRACKETS,
+    QUANTITIES,
+    UnitInName,
+    tick_in,
+    unit_in,
+)
 from pipelines.settings.units import UNITS
 
 
@@ -128,6 +134,9 @@ def meaning(name: str) -> Meaning:
     if in_name and not (in_name.decides or _confirms(in_name, quantity, set(words))):
         in_name, words = None, _split(plain)
         quantity = _quantity(set(words))
+    if in_name is None and quantity in ("", "time") and (tick := tick_in(plain)):
+        in_name, words = tick, _split(tick.rest)
+        quantity = "time"
     distinct = set(words) - _containers(plain)
     unit = None
     if in_name and in_name.unread:

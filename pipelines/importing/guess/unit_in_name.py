@@ -51,6 +51,8 @@ FACTOR = re.compile(
     r"(?:[\s_·*-]|of)*(?=(?i:rad|deg|grad|rev|turn|Nm|N[·*. _]m|newton|amp|volt)|[°ANV](?![^\W_]))"
 )
 """A factor next to a unit: ``x10``, ``/100``, ``10^-3``, ``0.1 Nm``, ``pi rad``."""
+TICK = re.compile(r"(?<![\d.,])(\d+(?:\.\d+)?)([ _]?)(ns|us|µs|μs|ms)(?![^\W_])")
+"""Duration of a count in the name of a clock: ``tick_100us``."""
 GRAD = "in lower case grad may be a gon, 0.9 degrees"
 """Doubt about the German word for a degree."""
 
@@ -87,6 +89,22 @@ def unit_in(name: str) -> UnitInName | None:
         if (unit or text in OTHERS) and not FACTOR.search(_without(name, bracket)):
             return UnitInName(_without(name, bracket), unit, decides=True)
     return _with_factor(name) or _outside_of_brackets(name)
+
+
+def tick_in(name: str) -> UnitInName | None:
+    """Return the duration of a count in the name of a clock; None where it has none."""
+    tick = TICK.search(name)
+    # Apart from its unit, as in axis_1_us, a number is of something else.
+    if tick is None or tick[2]:
+        return None
+    return UnitInName(_without(name, tick), _written(tick[3]), decides=True, unread=tick[0])
+
+
+def count_of(unread: str) -> tuple[str, float] | None:
+    """Return unit and number of a duration such as ``100us`` or ``0.1 ms``; None for others."""
+    tick = TICK.fullmatch(unread)
+    unit = _written(tick[3]) if tick else None
+    return (unit, float(tick[1])) if tick and unit and float(tick[1]) else None
 
 
 def _with_factor(name: str) -> UnitInName | None:
