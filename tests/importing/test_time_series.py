@@ -191,6 +191,26 @@ def test_a_clock_of_the_day_goes_on_after_midnight(imported, pendulum, write_csv
     assert_allclose(frame["time_s"], pendulum.time, atol=1e-9)
 
 
+@pytest.mark.parametrize(
+    ("begin", "hours", "form", "cause"),
+    [
+        ("1970-01-01 12:59:57", 12, "%I:%M:%S.%f", "as a 12-hour clock without AM and PM"),
+        ("2026-10-25 02:59:57", 1, "%Y-%m-%d %H:%M:%S.%f", "as at the end of summer time"),
+    ],
+)
+def test_a_written_clock_set_back_by_hours_names_the_cause_and_what_counts_it_on(
+    imported, pendulum, write_csv, begin, hours, form, cause
+):
+    back = pd.to_timedelta(np.where(pendulum.time < 3.0, 0, hours), unit="h")
+    stamps = pd.Timestamp(begin) + pd.to_timedelta(pendulum.time, unit="s") - back
+    path = write_csv(pendulum.columns() | {"time": stamps.strftime(form)})
+    text = with_clock('unit = "iso8601"')
+    remedy = f"wraps_at = {hours * 3600 * 10**9}"
+    assert f"{cause}: if that is so, set time.{remedy}" in imported(path, map_text=text).printed
+    frame = imported(path, map_text=with_clock(f'unit = "iso8601"\n{remedy}')).recording().frame
+    assert_allclose(frame["time_s"], pendulum.time, atol=1e-9)
+
+
 OWN = MAP.replace('column = "torque"', 'column = "torque", time = "own"')
 
 
