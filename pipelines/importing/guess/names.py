@@ -213,7 +213,7 @@ def _confirms(in_name: UnitInName, quantity: str, words: set[str]) -> bool:
         return quantity == "temperature" or "t" in words
     if in_name.quantity == "time":
         # A last s is often a plural or a symbol; ms, us and ns are nothing else.
-        return quantity == "time" or (not quantity and in_name.unit != "s")
+        return quantity == "time" or (not quantity and in_name.unit in ("ms", "us", "100ns", "ns"))
     if not in_name.quantity:
         # Drives log a share, in %, of their rated torque or current.
         return quantity in ("torque", "current")

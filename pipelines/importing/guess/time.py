@@ -21,8 +21,8 @@ ADVANCES = 0.9
 """Least share of the steps of a clock that go forward."""
 DAY_S = 86_400.0
 """A day, s."""
-LONG = ("min", "h", "d")
-"""Units that a clock with decimals may have, though few do."""
+LONG = ("min", "d", "h")
+"""Units that a clock with decimals may have, though few do; the likelier first."""
 USUAL = 2.0
 """Factor on the median within which stamps of a coarse clock are usual, in rows and in distance."""
 
@@ -283,7 +283,7 @@ def _scales(values: NDArray, step: float) -> list[tuple[str, float]]:
         tried += [(unit, 1.0) for unit in LONG]
     usual = [one for one in tried if clock.usual_units(step * one[1], [one[0]])]
     # A clock with decimals is hardly one in minutes, if it may be one in seconds.
-    return usual if are_whole(values) else usual[:1]
+    return usual if are_whole(values) or (usual[:1] and usual[0][0] in LONG) else usual[:1]
 
 
 def _epoch(values: NDArray, step: float) -> tuple[str, float, str] | None:
@@ -436,8 +436,8 @@ def write_time(proposal: Proposal, guess: TimeGuess, held: Sequence[str]) -> Non
         proposal.key("plus_unit", guess.plus_unit)
     if guess.scale != 1.0:
         proposal.key("scale", guess.scale, "as of the unit", guess.unit_sure)
-    # Times of day go on after midnight by themselves.
-    if guess.wraps_at and guess.unit != "iso8601":
+    # Times of day go on after midnight by themselves; minutes and seconds do not after an hour.
+    if guess.wraps_at and (guess.unit != "iso8601" or guess.wraps_at * guess.count_s < DAY_S):
         usual = clock.is_usual_modulus(guess.wraps_at, guess.count_s)
         why = "goes back where such a counter is full"
         if not usual:

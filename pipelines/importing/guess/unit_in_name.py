@@ -86,6 +86,9 @@ def unit_in(name: str) -> UnitInName | None:
         text = bracket[1].strip()
         # "grad" is a gon, and "Grad" a degree: units of no map come before those but for case.
         unit = None if text in OTHERS or text in FOREIGN else _written(text)
+        if text in ("h", "d") and not _WORD.search(_without(name, bracket)):
+            # Letters that are no unit of anything but a clock.
+            return UnitInName(_without(name, bracket), text, decides=False)
         if (unit or text in OTHERS) and not FACTOR.search(_without(name, bracket)):
             return UnitInName(_without(name, bracket), unit, decides=True)
     return _with_factor(name) or _outside_of_brackets(name)

@@ -488,7 +488,7 @@ def _note_restarts(
         action = "another run begins" if len(places) == 1 else "each time another run begins"
         if full is not None:
             before = float(raw[rows[first - 1]])
-            action = f"after {before:.10g}: if it was full, set time.wraps_at = {full:.12g}"
+            action = f"after {before:.10g}: if it was full, set time.wraps_at = {full:.14g}"
         elif (hours := _set_back(back, step * count_s)) is not None:
             modulus = _in_counts(hours * HOUR_S, count_s)
             action = f"{SET_BACK[hours]}: if that is so, set time.wraps_at = {modulus:.14g}"
