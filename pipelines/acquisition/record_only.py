@@ -8,7 +8,7 @@ give the uncertainty of a row's time.
 import asyncio
 import logging
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -83,7 +83,8 @@ def record_only(
     metadata |= _provenance(rig_path, rig, run, sample_rate_hz)
     logging.getLogger("pymodbus").setLevel(logging.CRITICAL)  # our errors say it
     with exclusive_access(rig), urgent(), collected_signals() as stopped_by:
-        recorder = _Recorder(rig, run, sample_rate_hz, stopped_by, report)
+        turning = {joint.name for joint in mechanism.all_joints if joint.turns}
+        recorder = _Recorder(rig, run, sample_rate_hz, turning, stopped_by, report)
         run_to_its_end(recorder.record(journal_path, metadata, claim), recorder.stop)
         with locked(journal_path) as lock:
             text = recorder.why or "the recording is complete"
@@ -148,10 +149,11 @@ class _Recorder:
         rig: RecordingRig,
         run: RunSettings,
         rate_hz: float,
+        turning: Collection[str],
         stopped_by: Sequence[str],
         report: Report,
     ) -> None:
-        self._rig = rig
+        self._rig, self._turning = rig, turning
         self._rate_hz, self._planned = rate_hz, round(run.duration_s * rate_hz)
         self._watchdog_s = rig.safety.watchdog_s
         self._stopped_by, self._report = stopped_by, report
@@ -171,7 +173,7 @@ class _Recorder:
 
     async def record(self, path: Path, metadata: dict[str, Any], claim: Callable[[], None]) -> None:
         """Connect, then write every row to the journal, which ends with the reason of a stop."""
-        machine = ReadOnlyMachine(self._rig, self._rate_hz)
+        machine = ReadOnlyMachine(self._rig, self._rate_hz, self._turning)
         try:
             await until_signal(machine.connect(), self._stopped_by)
             with Journal(path, ["time_s", *machine.columns, "sequence"], metadata) as journal:

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipelines.errors import InputError, SettingsError
-from pipelines.importing.finding import Finding, counted, noting
+from pipelines.importing.finding import Finding, counted, noting, unnoted
 from pipelines.importing.quantities.conversion import columns_of, quantity
 from pipelines.importing.quantities.numbers import TAKEN_FOR_MISSING, numbers, same_stamps
 from pipelines.importing.sources.source import Columns, Source
@@ -140,7 +140,13 @@ class Log:
             )
         note = noting(channel.target, findings)
         return quantity(
-            channel.reading, channel.gain, picked, channel.target, note, turns=channel.turns
+            channel.reading,
+            channel.gain,
+            picked,
+            channel.target,
+            note,
+            run.time_s,
+            turns=channel.turns,
         )
 
     def _interpolated(
@@ -156,9 +162,12 @@ class Log:
         if {len(values) for values in columns.values()} - {1, len(stamps)}:
             raise InputError(f"{channel.where} and its clock {column!r} differ in length")
         note = noting(channel.target, findings)
-        values = quantity(reading, channel.gain, columns, channel.target, note, turns=channel.turns)
         if not np.isfinite(stamps).any():
             raise InputError(f"{where} has no time stamp in any row; correct the column")
+        time_s = clock.seconds(stamps, clock.first_stamp(stamps), own_clock, unnoted)
+        values = quantity(
+            reading, channel.gain, columns, channel.target, note, time_s, turns=channel.turns
+        )
         known = np.isfinite(values) & np.isfinite(stamps)
         if not known.any():
             return np.full(len(run), np.nan)

@@ -27,6 +27,7 @@ class Block:
             ">" + "".join(STRUCT_CODES[r.type] for r in registers.values())
         )
         self._scales = [r.si for r in registers.values()]
+        self._sign_bits = [r.sign_bit for r in registers.values()]
         self._ranges = [r.counts for r in registers.values()]
 
     def _bytes(self, register: Register) -> list[int]:
@@ -49,8 +50,10 @@ class Block:
         """
         raw = self._values_format.unpack(bytes(self._pick(self._words_format.pack(*words))))
         return {
-            name: value * scale + offset
-            for name, value, (scale, offset) in zip(self.names, raw, self._scales, strict=True)
+            name: (value if bit is None else _flipped(value, bit)) * scale + offset
+            for name, value, bit, (scale, offset) in zip(
+                self.names, raw, self._sign_bits, self._scales, strict=True
+            )
         }
 
     def encode(self, values: Mapping[str, float]) -> list[int]:
@@ -67,13 +70,14 @@ class Block:
             ``count`` words.
         """
         raw = []
-        for name, (scale, offset), limits in zip(
-            self.names, self._scales, self._ranges, strict=True
+        for name, bit, (scale, offset), limits in zip(
+            self.names, self._sign_bits, self._scales, self._ranges, strict=True
         ):
             # A count beyond the range would raise an error in `struct`, so it saturates. A float is
             # not rounded.
             value = (values[name] - offset) / scale
-            raw.append(value if limits is None else min(max(round(value), limits[0]), limits[1]))
+            count = value if limits is None else min(max(round(value), limits[0]), limits[1])
+            raw.append(2**bit - count if bit is not None and count < 0 else count)
         # Registers without a name are written as 0; a drive's block has none (`DriveMap`).
         packed = bytearray(2 * self.count)
         for place, byte in zip(self._places, self._values_format.pack(*raw), strict=True):
@@ -101,3 +105,8 @@ class Block:
         register = self.registers[name]
         limits = register.counts
         return (limits[1] + 1) * register.si[0] if limits and limits[0] == 0 else 0.0
+
+
+def _flipped(raw: int, bit: int) -> int:
+    """Return the count of a register that holds a magnitude, and a bit that is set below zero."""
+    return raw if raw < 1 << bit else (1 << bit) - raw

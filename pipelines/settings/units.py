@@ -75,6 +75,9 @@ ALIASES = {
         "ms": ("msec",),
         # The micro sign and the Greek letter look alike, but are two characters.
         "us": ("usec", "µs", "μs"),
+        "min": ("minutes",),
+        "h": ("hours",),
+        "d": ("days",),
         "deg": ("°", "degree", "degrees", "Grad"),
         "rad": ("radians",),
         "rev": ("turn", "turns"),

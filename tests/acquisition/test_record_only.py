@@ -190,13 +190,13 @@ ELBOW = MechanismSettings.model_validate({"joints": [{"name": "elbow", "kind": "
 def record_bench(tmp_path):
     """Record a device for 0.8 s; return the rows. Nothing may be written to it."""
 
-    def run(answer, most_answers=10**9, rate_hz=100.0, watchdog_s=0.6):
+    def run(answer, most_answers=10**9, rate_hz=100.0, watchdog_s=0.6, mechanism=ELBOW):
         server, asked = a_device(answer, most_answers)
         path, output = tmp_path / "bench.toml", tmp_path / "bench.parquet"
         path.write_text(BENCH.format(port=server.getsockname()[1], watchdog_s=watchdog_s))
         settings = RunSettings(name="one", run="exo_alone", purpose="train", duration_s=0.8)
         with server:
-            record_only(path, settings, output, rate_hz, ELBOW)
+            record_only(path, settings, output, rate_hz, mechanism)
         assert asked == {3}
         return RECORDING.read(output).frame
 
@@ -528,6 +528,16 @@ def test_the_turns_of_a_joint_without_end_are_counted(turntable, tmp_path):
     assert np.allclose(angle - angle.iloc[0], turned, atol=1e-6)
 
 
+def test_a_multi_turn_register_is_recorded_beyond_one_turn(record_bench):
+    def answer(n, words):
+        return [words[0], 12000 + words[0] * 50, 20]
+
+    with pytest.raises(DeviceError, match="joint without end needs turns = true"):
+        record_bench(answer)
+    angle = record_bench(answer, mechanism=TURNING)["elbow_angle_rad"]
+    assert angle.iloc[0] > 12.0 and angle.iloc[-1] > angle.iloc[0] + 2.0
+
+
 def test_an_angle_that_starts_again_is_never_recorded_as_a_leap(turntable, tmp_path):
     path, server = turntable()
     settings = RunSettings(name="one", run="exo_alone", purpose="train", duration_s=3.0)
@@ -566,3 +576,24 @@ def test_a_sign_that_is_misread_is_named(tmp_path, kind, negative, expected):
     texts = findings_of(path, server)
     assert len(texts) == bool(expected)
     assert all(expected in one and "torque leaps by" in one for one in texts)
+
+
+def test_a_torque_of_magnitude_and_sign_bit_is_recorded_and_has_no_findings(tmp_path):
+    def answer(n, words):
+        torque = round(200.0 * np.sin(0.2 * words[0] + 0.1))
+        return [words[0], 500, torque if torque >= 0 else 32768 - torque]
+
+    path, output = tmp_path / "bench.toml", tmp_path / "bench.parquet"
+    for act in ("check", "record"):
+        server, _ = a_device(answer)
+        text = BENCH.format(port=server.getsockname()[1], watchdog_s=1.0)
+        was = 'torque = { address = 2, type = "int16"'
+        path.write_text(text.replace(was, f"{was.replace('int16', 'uint16')}, sign_bit = 15"))
+        if act == "check":
+            assert findings_of(path, server) == []
+            continue
+        settings = RunSettings(name="one", run="exo_alone", purpose="train", duration_s=0.8)
+        with server:
+            record_only(path, settings, output, 100.0, ELBOW)
+    torque = RECORDING.read(output).frame["elbow_torque_nm"]
+    assert -20.0 <= torque.min() < -15.0 and 15.0 < torque.max() <= 20.0

@@ -8,6 +8,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 from exoid_cli.app import run
+from pipelines.importing.guess.names import meaning
 from pipelines.importing.guess.torque import fit_torque
 from pipelines.importing.quantities.wraparound import fill_value, full_at, sign_bit
 from tests.importing.test_guess import guessed
@@ -242,6 +243,8 @@ def test_an_angle_that_is_blank_where_the_torque_is_logged_is_interpolated(
         ("Position_deg_x100", "Torque_Nm_x10"),
         ("Position [1e-2 deg]", "Torque [dNm]"),
         ("Position_cdeg", "Torque_dNm"),
+        ("Position [pi rad]", "Torque [kilo Nm]"),
+        ("Position_half_turns", "Torque [tenths of Nm]"),
     ],
 )
 def test_a_unit_with_a_factor_or_a_prefix_is_not_read_as_the_unit_alone(
@@ -259,8 +262,44 @@ def test_a_factor_in_a_name_is_given_with_the_keys_to_set(guessed, pendulum, wri
         "Torque [0.1 Nm]": 10.0 * pendulum.torque,
     }
     _, doubts = guessed(write_csv(columns))
-    assert "its name says '0.1 ms': set unit and scale" in doubts["time.unit"]
+    assert "its name says '0.1 ms': 200 Hz" in doubts["time.unit"]
     assert "its name says '0.1 Nm': set unit and scale" in doubts["joint[0].torque.unit"]
+
+
+@pytest.mark.parametrize(
+    ("name", "unit", "scale"),
+    [("tick_100us", "us", 100.0), ("cycle_500us", "us", 500.0), ("Time [0.1 ms]", "ms", 0.1)],
+)
+def test_the_duration_of_a_tick_in_a_name_is_proposed_and_imports_the_truth(
+    imported, guessed, pendulum, write_csv, name, unit, scale
+):
+    count_s = scale * {"us": 1e-6, "ms": 1e-3}[unit]
+    path = write_csv(
+        {
+            name: np.round(pendulum.time / count_s).astype(int) + 123_456,
+            "angle_rad": pendulum.angle,
+            "torque_Nm": pendulum.torque,
+        }
+    )
+    text, doubts = guessed(path)
+    assert tomllib.loads(text)["time"] == {"column": name, "unit": unit, "scale": scale}
+    assert "its name says" in doubts["time.unit"]
+    frame = imported(path, map_text=text).recording("log_train").frame
+    assert_allclose(frame["time_s"], pendulum.time[: len(frame)], atol=1e-9)
+
+
+def test_a_tick_with_its_duration_next_to_a_clock_of_the_same_times_is_no_rival(
+    guessed, pendulum, write_csv
+):
+    ticks = np.round(pendulum.time * 1e4).astype(int)
+    text, doubts = guessed(write_csv(pendulum.columns() | {"tick_100us": ticks}))
+    assert tomllib.loads(text)["time"]["column"] == "time"
+    assert "tick_100us" not in doubts.get("time.column", "")
+
+
+@pytest.mark.parametrize("name", ["speed_10ms", "axis_1_us", "q1_s"])
+def test_a_number_before_a_unit_of_time_is_no_tick_in_other_names(name):
+    assert not meaning(name).unread
 
 
 @pytest.mark.parametrize("gon", ["gon", "grad"])
@@ -274,6 +313,20 @@ def test_a_unit_that_no_map_has_is_quoted_and_no_joints_name(guessed, pendulum, 
     assert tomllib.loads(text)["joint"][0]["name"] == "joint"
     assert f"its name says {gon!r}" in doubts["joint[0].angle.unit"]
     assert "its name says 'oz-in'" in doubts["joint[0].torque.unit"]
+
+
+@pytest.mark.parametrize("name", ["winkel_grad", "winkel [Grad]"])
+def test_grad_in_lower_case_is_a_degree_in_doubt(guessed, pendulum, write_csv, name):
+    columns = {"time": pendulum.time, name: np.degrees(pendulum.angle), "tau_Nm": pendulum.torque}
+    text, doubts = guessed(write_csv(columns))
+    assert tomllib.loads(text)["joint"][0]["angle"]["unit"] == "deg"
+    assert ("gon" in doubts.get("joint[0].angle.unit", "")) == (name == "winkel_grad")
+
+
+@pytest.mark.parametrize("name", ["tau_PI [Nm]", "pi_controller_torque [Nm]", "half_angle [rad]"])
+def test_a_word_before_no_unit_is_no_factor(name):
+    column = meaning(name)
+    assert column.unit and not column.unread
 
 
 @pytest.mark.parametrize("begin", ["2026-03-04 12:00:00", "2026-03-04 23:59:57"])

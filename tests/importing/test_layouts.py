@@ -166,6 +166,14 @@ def test_names_in_two_lines_are_put_together(read, table):
     assert_same(columns, table, names)
 
 
+@pytest.mark.parametrize("units", ["s,rad,rad/s,Nm", "[s],[rad],[rad/s],[Nm]", "s,rad,,Nm"])
+def test_a_line_of_descriptions_below_names_and_units_hides_neither(read, table, units):
+    below = 'of the logger,of the joint,"estimate, filtered",at the joint'
+    _, columns = read(["t,phi,dphi,tau", units, below, *joined(table)])
+    velocity = "dphi [rad/s]" if "rad/s" in units else "dphi"
+    assert_same(columns, table, ["t [s]", "phi [rad]", velocity, "tau [Nm]"])
+
+
 def test_an_export_of_twincat_scope_names_its_columns_and_clocks(read, table):
     """Facts about each channel, whose key stands at every clock; a clock may serve several."""
     facts = {"Name": NAMES[1:], "SampleTime[ms]": "1" * 3, "Unit": ("rad", "(None)", "Nm")}

@@ -293,6 +293,21 @@ def test_a_counter_begins_in_the_turn_nearest_to_zero_whatever_turn_it_is_logged
     assert "turn apart" not in outcome.printed
 
 
+@pytest.mark.parametrize(("lost", "guessed"), [(4, 0), (150, 1)])
+def test_a_gap_in_which_a_counter_may_turn_by_half_is_reported(
+    imported, pendulum, write_csv, lost, guessed
+):
+    # At its fastest the joint needs 0.2 s for half of it.
+    modulus = 0.4 * np.max(np.abs(pendulum.velocity))
+    kept = np.r_[0:700, 700 + lost : len(pendulum.time)]
+    columns = pendulum.columns() | {"angle": pendulum.angle % modulus}
+    path = write_csv({name: values[kept] for name, values in columns.items()})
+    text = MAP.replace('unit = "rad"', f'unit = "rad", wraps_at = {modulus:.9g}', 1)
+    outcome = imported(path, map_text=text)
+    assert outcome.code == 0, outcome
+    assert outcome.printed.count("in 1 gap, the first at 3.495 s; the turn after each") == guessed
+
+
 def test_logs_that_begin_more_than_half_a_turn_apart_are_reported_and_begins_at_settles_it(
     imported, pendulum, write_csv
 ):

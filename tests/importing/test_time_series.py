@@ -1,6 +1,7 @@
 """Clocks as devices have them, of any scale, rate and date; later stages agree with the import."""
 
 import json
+import re
 import tomllib
 from dataclasses import replace
 
@@ -17,6 +18,9 @@ from pipelines.mechanics.motion import motion_from_table
 from pipelines.settings.filter import FilterSettings
 from pipelines.signals.sampling import missing_samples, sample_rate, whole_periods
 from tests.importing.conftest import MAP
+from tests.importing.test_guess import guessed
+
+__all__ = ["guessed"]
 
 
 def with_clock(keys: str) -> str:
@@ -189,6 +193,64 @@ def test_a_clock_of_the_day_goes_on_after_midnight(imported, pendulum, write_csv
     keys = f'unit = "{unit}"' + ("" if written else "\nwraps_at = 86400")
     frame = imported(path, map_text=with_clock(keys)).recording().frame
     assert_allclose(frame["time_s"], pendulum.time, atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("begin", "hours", "form", "cause"),
+    [
+        ("1970-01-01 12:59:57", 12, "%I:%M:%S.%f", "as a 12-hour clock without AM and PM"),
+        ("2026-10-25 02:59:57", 1, "%Y-%m-%d %H:%M:%S.%f", "as at the end of summer time"),
+    ],
+)
+def test_a_written_clock_set_back_by_hours_names_the_cause_and_what_counts_it_on(
+    imported, pendulum, write_csv, begin, hours, form, cause
+):
+    back = pd.to_timedelta(np.where(pendulum.time < 3.0, 0, hours), unit="h")
+    stamps = pd.Timestamp(begin) + pd.to_timedelta(pendulum.time, unit="s") - back
+    path = write_csv(pendulum.columns() | {"time": stamps.strftime(form)})
+    text = with_clock('unit = "iso8601"')
+    remedy = f"wraps_at = {hours * 3600 * 10**9}"
+    assert f"{cause}: if that is so, set time.{remedy}" in imported(path, map_text=text).printed
+    frame = imported(path, map_text=with_clock(f'unit = "iso8601"\n{remedy}')).recording().frame
+    assert_allclose(frame["time_s"], pendulum.time, atol=1e-9)
+
+
+def test_minutes_and_seconds_are_a_clock_that_starts_over_after_an_hour(
+    imported, guessed, pendulum, write_csv
+):
+    since = (3595.0 + pendulum.time) % 3600.0
+    written = [f"{int(s // 60):02d}:{s % 60:06.3f}" for s in np.round(since, 3)]
+    path = write_csv(pendulum.columns() | {"time": written})
+    text, doubts = guessed(path)
+    hour_ns = 3_600_000_000_000
+    assert (
+        f"time.wraps_at = {hour_ns}"
+        in imported(path, map_text=re.sub("wraps_at.*", "", text)).printed
+    )
+    assert tomllib.loads(text)["time"]["wraps_at"] == hour_ns and "time.wraps_at" in doubts
+    frame = imported(path, map_text=text).recording("log_train").frame
+    assert_allclose(frame["time_s"], pendulum.time[: len(frame)], atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("name", "per_unit_s", "unit"),
+    [
+        ("Time [d]", 86400.0, "d"),
+        ("time_days", 86400.0, "d"),
+        ("Time [h]", 3600.0, "h"),
+        ("time", 86400.0, "d"),
+    ],
+)
+def test_a_clock_in_days_or_hours_with_decimals_is_proposed(
+    imported, guessed, pendulum, write_csv, name, per_unit_s, unit
+):
+    columns = {name: 0.4 + pendulum.time / per_unit_s, "angle_rad": pendulum.angle}
+    path = write_csv(columns | {"torque_Nm": pendulum.torque})
+    text, doubts = guessed(path)
+    assert tomllib.loads(text)["time"] == {"column": name, "unit": unit}
+    assert ("time.unit" in doubts) == (name == "time")
+    frame = imported(path, map_text=text).recording("log_train").frame
+    assert_allclose(frame["time_s"], pendulum.time[: len(frame)], atol=1e-6)
 
 
 OWN = MAP.replace('column = "torque"', 'column = "torque", time = "own"')

@@ -184,6 +184,21 @@ def test_a_value_too_large_saturates_as_in_a_device():
     assert not block.registers["x"].holds(-33.0, 0.0)
 
 
+def test_a_magnitude_with_a_sign_bit_is_read_and_written():
+    block = Block({"x": Register(address=0, type="uint16", sign_bit=15, scale=0.1, unit="A")})
+    assert block.decode([0x8000 | 25])["x"] == pytest.approx(-2.5)
+    for value, word in ((-2.5, 0x8000 | 25), (2.5, 25), (-1e9, 0xFFFF), (1e9, 0x7FFF)):
+        assert block.encode({"x": value}) == [word]
+    assert block.registers["x"].span == pytest.approx((-3276.7, 3276.7))
+    assert block.modulus("x") == 0.0
+
+
+@pytest.mark.parametrize(("kind", "bit"), [("int16", 15), ("float32", 15), ("uint16", 16)])
+def test_a_sign_bit_outside_of_an_unsigned_type_is_refused(kind, bit):
+    with pytest.raises(ValueError, match="expected a bit of an unsigned type"):
+        Register(address=0, type=kind, sign_bit=bit)
+
+
 def test_units_become_si():
     block = Block(
         {

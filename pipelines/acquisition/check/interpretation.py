@@ -38,6 +38,9 @@ def _interpretations(name: str, block: Block) -> Iterator[Interpretation]:
         end = was.address + REGISTERS[kind]
         if end > block.address + block.count or taken & set(range(was.address, end)):
             continue
+        # Other types hold no magnitude with a sign bit.
+        if was.sign_bit is not None and kind != was.type:
+            continue
         # A single word has no order.
         if REGISTERS[kind] == 1 and order != was.word_order:
             continue

@@ -25,7 +25,7 @@ def leap_of(series: Series, name: str, of_turn: bool = False) -> float | None:
     per_count = abs(register.si[0])
     counts = series.of(name)[series.fresh] / per_count
     steps = np.abs(np.diff(counts))
-    # A leap is half of all that the value does; all else is small beside it.
+    # A leap is half of all that the value does; all else is small against it.
     leaps = steps > 0.5 * np.ptp(counts)
     if not leaps.any() or leaps.all():
         return None

@@ -81,7 +81,7 @@ class Expectation:
 _ANYWHERE = Expectation(
     -LARGEST_ANGLE_RAD,
     LARGEST_ANGLE_RAD,
-    f"beyond the {LARGEST_ANGLE_RAD:.4g} rad that a recording holds",
+    f"beyond the {LARGEST_ANGLE_RAD:.4g} rad that a recording holds without turns = true",
 )
 """The angles of a machine that exoid only reads."""
 

@@ -48,8 +48,7 @@ def check_signs(probe: Probe, series: Series) -> Iterator[Finding]:
             remedy = f'negative values are read as large ones; set {where}.type = "int16"'
         elif full == 2.0**15:
             remedy = (
-                f"a magnitude with a sign bit, which no type of {where} reads; record another"
-                " register, or log it and import the log with sign_bit = 15"
+                f'it is a magnitude with a sign bit; set {where}.type = "uint16" and sign_bit = 15'
             )
         else:
             continue

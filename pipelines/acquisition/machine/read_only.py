@@ -1,7 +1,7 @@
 """A machine that its own controller moves, as exoid reads it: rows with the instants of reading."""
 
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from math import isfinite
@@ -30,8 +30,14 @@ class ReadOnlyPart:
     """One device that is read, and never written to."""
 
     def __init__(
-        self, rig: RecordingRig, settings: RecordedJoint | SensorSettings, line: Line
+        self,
+        rig: RecordingRig,
+        settings: RecordedJoint | SensorSettings,
+        line: Line,
+        *,
+        turns: bool = False,
     ) -> None:
+        """Prepare reading; the angle of a joint that ``turns`` without end has no limit."""
         self.settings = settings
         self.map: JointMap | ForceMap
         if isinstance(settings, RecordedJoint):
@@ -44,6 +50,7 @@ class ReadOnlyPart:
         angle = self.reader.block.registers.get("angle")
         self._turn = angle.turn if angle else 0.0
         self._followed = FollowedAngle(self._turn)
+        self._is_limited = not (turns or self._turn)
 
     async def begin(self, earlier: Sequence[Device]) -> None:
         """Connect, check its identity, and read it once.
@@ -80,11 +87,11 @@ class ReadOnlyPart:
                     " register map in the rig file with the device's manual"
                 )
             is_angle = name in ("angle", "reference")
-            if is_angle and not self._turn and abs(value) > LARGEST_ANGLE_RAD:
+            if is_angle and self._is_limited and abs(value) > LARGEST_ANGLE_RAD:
                 raise DeviceError(
                     f"{self.device.label}: its {name} is {value:.4g} rad, and a recording holds at"
                     f" most {LARGEST_ANGLE_RAD:.4g}; `exoid rig check` tries other addresses, types"
-                    " and word orders"
+                    " and word orders. A joint without end needs turns = true in [mechanism]"
                 )
         if self._turn:
             values |= self._with_turns(values)
@@ -128,10 +135,24 @@ class ReadOnlyRow:
 class ReadOnlyMachine:
     """All devices of a recording-only rig."""
 
-    def __init__(self, rig: RecordingRig, rate_hz: float = 1.0) -> None:
-        """Prepare reading, with the rate of the devices' counters for rows."""
+    def __init__(
+        self, rig: RecordingRig, rate_hz: float = 1.0, turning: Collection[str] = ()
+    ) -> None:
+        """Prepare reading.
+
+        Parameters
+        ----------
+        rig : RecordingRig
+            The devices.
+        rate_hz : float, optional
+            Rate of their counters for rows.
+        turning : collection of str, optional
+            Joints that turn without end.
+        """
         line_of = lines_of(rig)
-        self.parts = [ReadOnlyPart(rig, one, line_of(one)) for one in rig.drive]
+        self.parts = [
+            ReadOnlyPart(rig, one, line_of(one), turns=one.joint in turning) for one in rig.drive
+        ]
         self.parts += [ReadOnlyPart(rig, one, line_of(one)) for one in rig.sensor]
         self._picked = [
             (k, quantity, Joint(joint.joint).column(quantity))

@@ -70,7 +70,7 @@ def propose(paths: Sequence[Path]) -> Proposal:
     by_rows = clocks_by_rows(time, columns) | dict(source.clocks)
     first = time
     time, clock_names = with_slowest(time, by_rows, names, columns, typed)
-    # A clock that no name tells is no angle, such as enc_ms of an encoder.
+    # A clock without such a name is no angle, such as enc_ms of an encoder.
     stamps = {first.column, *first.rivals}
     names = [replace(m, quantity="time", joint="") if m.column in stamps else m for m in names]
     of_clocks = own_clocks(clock_names.values(), time, names, columns, typed)

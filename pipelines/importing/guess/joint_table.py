@@ -92,6 +92,7 @@ def _units(
         angle.unit or of_turn,
         logged.get("velocity"),
         velocity.unit if velocity else None,
+        angle.doubt,
     )
     if of_turn and angle.unit is None:
         return replace(units, why=f"wraps around after {full:.6g}, a turn")
@@ -167,7 +168,9 @@ class _JointWriter:
         self._write_column("velocity")
         units = self.units
         why = units.velocity_why + ("" if units.velocity_sure else self._unread("velocity", "; "))
-        self.proposal.key("unit", units.velocity, why, units.velocity_sure)
+        doubt = self.joint.columns["velocity"].doubt
+        why += f"; {doubt}" if doubt else ""
+        self.proposal.key("unit", units.velocity, why, units.velocity_sure and not doubt)
         if UNITS[units.velocity].dimension == "counts per second":
             self._write_counts()
         if units.velocity_sign < 0:
@@ -211,7 +214,8 @@ class _JointWriter:
             dimensions = (dimension_at(self.kind, quantity), "counts")
             if meaning.unit is not None and UNITS[meaning.unit].dimension in dimensions:
                 unit = meaning.unit
-                self.proposal.key("unit", unit, FROM_NAME)
+                why = "; ".join(filter(None, (FROM_NAME, meaning.doubt)))
+                self.proposal.key("unit", unit, why, not meaning.doubt)
             else:
                 unit = usual
                 why = f"as is usual{self._unread(quantity, '; ')}"

@@ -62,6 +62,7 @@ def guess_units(
     named: str | None,
     velocity: NDArray | None,
     velocity_named: str | None,
+    doubt: str = "",
 ) -> Units:
     """Return the units of an angle and its velocity; names take precedence over numbers.
 
@@ -77,8 +78,12 @@ def guess_units(
         Velocity as logged.
     velocity_named : str or None
         Unit in the name of its column.
+    doubt : str, optional
+        Another meaning that the unit in the angle's name may have.
     """
     unit, why, sure = _angle_unit(angle, named)
+    if doubt:
+        why, sure = f"{why}; {doubt}", False
     if velocity is None:
         return Units(unit, why, sure)
     agreement = integral_agreement(time_s, angle, velocity)

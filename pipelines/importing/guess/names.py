@@ -5,7 +5,13 @@ import unicodedata
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
-from pipelines.importing.guess.unit_in_name import BRACKETS, QUANTITIES, UnitInName, unit_in
+from pipelines.importing.guess.unit_in_name import (
+    BRACKETS,
+    QUANTITIES,
+    UnitInName,
+    tick_in,
+    unit_in,
+)
 from pipelines.settings.units import UNITS
 
 
@@ -107,6 +113,8 @@ class Meaning:
     measured: bool
     unread: str = ""
     """Text of a unit in the name that no map has, such as ``0.1 Nm``."""
+    doubt: str = ""
+    """Another meaning that the unit in the name may have."""
 
     @property
     def rank(self) -> int:
@@ -126,6 +134,9 @@ def meaning(name: str) -> Meaning:
     if in_name and not (in_name.decides or _confirms(in_name, quantity, set(words))):
         in_name, words = None, _split(plain)
         quantity = _quantity(set(words))
+    if in_name is None and quantity in ("", "time") and (tick := tick_in(plain)):
+        in_name, words = tick, _split(tick.rest)
+        quantity = "time"
     distinct = set(words) - _containers(plain)
     unit = None
     if in_name and in_name.unread:
@@ -157,6 +168,7 @@ def meaning(name: str) -> Meaning:
         filtered=bool(distinct & FILTERED),
         measured=bool(distinct & MEASURED),
         unread=in_name.unread if in_name else "",
+        doubt=in_name.doubt if in_name and unit else "",
     )
 
 
@@ -201,7 +213,7 @@ def _confirms(in_name: UnitInName, quantity: str, words: set[str]) -> bool:
         return quantity == "temperature" or "t" in words
     if in_name.quantity == "time":
         # A last s is often a plural or a symbol; ms, us and ns are nothing else.
-        return quantity == "time" or (not quantity and in_name.unit != "s")
+        return quantity == "time" or (not quantity and in_name.unit in ("ms", "us", "100ns", "ns"))
     if not in_name.quantity:
         # Drives log a share, in %, of their rated torque or current.
         return quantity in ("torque", "current")

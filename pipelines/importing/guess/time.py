@@ -11,6 +11,7 @@ from pipelines.importing.guess.joints import JointColumns
 from pipelines.importing.guess.motion import CLEAR, EXACT, FROM_NAME, factors
 from pipelines.importing.guess.names import Meaning
 from pipelines.importing.guess.proposal import Proposal
+from pipelines.importing.guess.unit_in_name import count_of
 from pipelines.importing.quantities.consistency import integral_agreement
 from pipelines.importing.quantities.numbers import are_whole
 from pipelines.importing.time import clock
@@ -20,8 +21,8 @@ ADVANCES = 0.9
 """Least share of the steps of a clock that go forward."""
 DAY_S = 86_400.0
 """A day, s."""
-LONG = ("min", "h", "d")
-"""Units that a clock with decimals may have, though few do."""
+LONG = ("min", "d", "h")
+"""Units that a clock with decimals may have, though few do; the likelier first."""
 USUAL = 2.0
 """Factor on the median within which stamps of a coarse clock are usual, in rows and in distance."""
 
@@ -133,7 +134,7 @@ def guess_time(
                 and (m.quantity == "time" or not (named or m.quantity))
                 and _advances_in_its_rows(m, columns)
             ]
-            clocks = [(m.column, _unit(m, typed) or guess.unit) for m in named + coarse + partial]
+            clocks = [(m.column, _count_s(m, typed, guess.unit)) for m in named + coarse + partial]
             return replace(guess, rivals=tuple(_rivals(guess, clocks, columns)))
     return None
 
@@ -191,12 +192,12 @@ def _together(seconds: NDArray, fractions: NDArray, unit: str, of_seconds: str) 
 
 
 def _rivals(
-    guess: TimeGuess, clocks: Sequence[tuple[str, str]], columns: Mapping[str, NDArray]
+    guess: TimeGuess, clocks: Sequence[tuple[str, float]], columns: Mapping[str, NDArray]
 ) -> Iterator[str]:
-    """Yield the other named clocks, with their units, that have other times than the guess."""
+    """Yield the other named clocks, with the length of a count (s), of other times."""
     time_s = columns[guess.column].astype(float) * guess.count_s
-    for name, unit in clocks:
-        other_s = columns[name].astype(float) * UNITS[unit].factor
+    for name, count_s in clocks:
+        other_s = columns[name].astype(float) * count_s
         if name == guess.column or len(other_s) != len(time_s):
             continue
         # Clocks of two devices are apart by a little, or drift. A date, and the time since the log
@@ -217,6 +218,9 @@ def _guess(
     fitting = [(known, 1.0)] if known else _scales(values, step)
     if epoch and not known:
         fitting = [epoch[:2], *(one for one in fitting if one != epoch[:2])]
+    stated = None if known else count_of(meaning.unread)
+    if stated:
+        fitting = [stated, *(one for one in fitting if not _are_equal(one, stated))]
     if not fitting:
         return None
     unit, scale = fitting[0]
@@ -228,6 +232,8 @@ def _guess(
     if known:
         by_type = {"iso8601": "dates written out", "ns": "durations, here in whole ns"}
         why = f"{by_type.get(typed.get(meaning.column, ''), FROM_NAME)}: {rate_hz:.4g} Hz"
+    elif stated:
+        why = f"its name says {meaning.unread!r}: {rate_hz:.4g} Hz"
     elif epoch:
         why = f"{epoch[2]}: {rate_hz:.4g} Hz"
     else:
@@ -239,7 +245,7 @@ def _guess(
             )
     if not is_named:
         why += "; no name shows which column is the time"
-    if meaning.unread:
+    if meaning.unread and not stated:
         why += f"; its name says {meaning.unread!r}: set unit and scale by that"
     if not is_usual:
         usual = clock.usual_units(step)
@@ -277,7 +283,7 @@ def _scales(values: NDArray, step: float) -> list[tuple[str, float]]:
         tried += [(unit, 1.0) for unit in LONG]
     usual = [one for one in tried if clock.usual_units(step * one[1], [one[0]])]
     # A clock with decimals is hardly one in minutes, if it may be one in seconds.
-    return usual if are_whole(values) else usual[:1]
+    return usual if are_whole(values) or (usual[:1] and usual[0][0] in LONG) else usual[:1]
 
 
 def _epoch(values: NDArray, step: float) -> tuple[str, float, str] | None:
@@ -333,7 +339,8 @@ def settled(
             if any(
                 abs(factor - 1.0) < EXACT for factor in factors(slope, angle.unit, velocity.unit)
             ):
-                named = guess.sure and bool(angle.unit and velocity.unit)
+                doubted = angle.doubt or velocity.doubt
+                named = guess.sure and bool(angle.unit and velocity.unit) and not doubted
                 why = f"{guess.why}; in {scale:g} {unit} the velocity integrates to the angle"
                 return replace(guess, unit=unit, scale=scale, why=why, unit_sure=named)
     return guess
@@ -343,6 +350,18 @@ def _unit(meaning: Meaning, typed: Mapping[str, str]) -> str | None:
     """Return the known unit of a clock; the type of the column takes precedence over its name."""
     named = meaning.unit if meaning.unit and UNITS[meaning.unit].dimension == "time" else None
     return typed.get(meaning.column, named)
+
+
+def _count_s(meaning: Meaning, typed: Mapping[str, str], usual: str) -> float:
+    """Return the duration of a count of a clock, s, by its name, else in the usual unit."""
+    unit, scale = count_of(meaning.unread) or (usual, 1.0)
+    return UNITS[_unit(meaning, typed) or unit].factor * scale
+
+
+def _are_equal(one: tuple[str, float], other: tuple[str, float]) -> bool:
+    """Return whether two units with their scales are the same duration."""
+    durations = [UNITS[unit].factor * scale for unit, scale in (one, other)]
+    return abs(durations[0] / durations[1] - 1.0) < 1e-9
 
 
 def _finer(
@@ -417,8 +436,8 @@ def write_time(proposal: Proposal, guess: TimeGuess, held: Sequence[str]) -> Non
         proposal.key("plus_unit", guess.plus_unit)
     if guess.scale != 1.0:
         proposal.key("scale", guess.scale, "as of the unit", guess.unit_sure)
-    # Times of day go on after midnight by themselves.
-    if guess.wraps_at and guess.unit != "iso8601":
+    # Times of day go on after midnight by themselves; minutes and seconds do not after an hour.
+    if guess.wraps_at and (guess.unit != "iso8601" or guess.wraps_at * guess.count_s < DAY_S):
         usual = clock.is_usual_modulus(guess.wraps_at, guess.count_s)
         why = "goes back where such a counter is full"
         if not usual:

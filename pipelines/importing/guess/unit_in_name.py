@@ -32,7 +32,7 @@ OTHERS = (
 """Units of quantities that no map has."""
 FOREIGN = {
     **dict.fromkeys(("gon", "grad", "mgon", "arcmin", "arcsec", "ft"), "angle"),
-    **dict.fromkeys(("gon/s", "deg/min", "°/min", "rad/min", "rev/h"), "velocity"),
+    **dict.fromkeys(("gon/s", "grad/s", "deg/min", "°/min", "rad/min", "rev/h"), "velocity"),
     **dict.fromkeys(("m/min", "mm/min", "in/min", "ft/s", "km/h", "mph"), "velocity"),
     **dict.fromkeys(
         ("kgf·m", "kgf*m", "kgf.m", "kgfm", "kpm", "kp·m", "dyn·cm", "gf·cm"), "torque"
@@ -44,8 +44,17 @@ FOREIGN = {
 }
 """Units in brackets that no map has, and the quantity that is measured in them."""
 BRACKETS = re.compile(r"[\[({<]([^\])}>]*)[\])}>]")
-FACTOR = re.compile(r"(?<![^\W_])[x×*/] ?10+(?![\d.])|(?<!\d)10 ?\^ ?-?\d+|\d*\.\d+(?= ?[^\W\d_])")
-"""A factor next to a unit outside of brackets: ``x10``, ``/100``, ``10^-3``, ``0.1 Nm``."""
+FACTOR = re.compile(
+    r"(?<![^\W_])[x×*/] ?10+(?![\d.])|(?<!\d)10 ?\^ ?-?\d+|\d*\.\d+(?= ?[^\W\d_])"
+    # As words only before a unit: pi is also a kind of controller.
+    r"|(?<![^\W\d_])(?i:pi|π|half|tenths?|hundredths?|thousandths?|kilo|milli|micro)"
+    r"(?:[\s_·*-]|of)*(?=(?i:rad|deg|grad|rev|turn|Nm|N[·*. _]m|newton|amp|volt)|[°ANV](?![^\W_]))"
+)
+"""A factor next to a unit: ``x10``, ``/100``, ``10^-3``, ``0.1 Nm``, ``pi rad``."""
+TICK = re.compile(r"(?<![\d.,])(\d+(?:\.\d+)?)([ _]?)(ns|us|µs|μs|ms)(?![^\W_])")
+"""Duration of a count in the name of a clock: ``tick_100us``."""
+GRAD = "in lower case grad may be a gon, 0.9 degrees"
+"""Doubt about the German word for a degree."""
 
 
 @dataclass(frozen=True)
@@ -59,6 +68,8 @@ class UnitInName:
     """Whether it determines the quantity; a letter or a word may mean something else."""
     unread: str = ""
     """Text of a unit that no map has, or of one with a factor: ``0.1 Nm``."""
+    doubt: str = ""
+    """Another meaning that the unit may have."""
 
     @property
     def quantity(self) -> str:
@@ -75,9 +86,28 @@ def unit_in(name: str) -> UnitInName | None:
         text = bracket[1].strip()
         # "grad" is a gon, and "Grad" a degree: units of no map come before those but for case.
         unit = None if text in OTHERS or text in FOREIGN else _written(text)
+        if text in ("h", "d") and not _WORD.search(_without(name, bracket)):
+            # Letters that are no unit of anything but a clock.
+            return UnitInName(_without(name, bracket), text, decides=False)
         if (unit or text in OTHERS) and not FACTOR.search(_without(name, bracket)):
             return UnitInName(_without(name, bracket), unit, decides=True)
     return _with_factor(name) or _outside_of_brackets(name)
+
+
+def tick_in(name: str) -> UnitInName | None:
+    """Return the duration of a count in the name of a clock; None where it has none."""
+    tick = TICK.search(name)
+    # Apart from its unit, as in axis_1_us, a number is of something else.
+    if tick is None or tick[2]:
+        return None
+    return UnitInName(_without(name, tick), _written(tick[3]), decides=True, unread=tick[0])
+
+
+def count_of(unread: str) -> tuple[str, float] | None:
+    """Return unit and number of a duration such as ``100us`` or ``0.1 ms``; None for others."""
+    tick = TICK.fullmatch(unread)
+    unit = _written(tick[3]) if tick else None
+    return (unit, float(tick[1])) if tick and unit and float(tick[1]) else None
 
 
 def _with_factor(name: str) -> UnitInName | None:
@@ -87,7 +117,9 @@ def _with_factor(name: str) -> UnitInName | None:
         known = text in OTHERS or _written(text)
         if text in FOREIGN:
             return UnitInName(_without(name, bracket), None, decides=True, unread=text)
-        has_factor = re.search(r"\d", text) and (_WORD.search(text) or "%" in text)
+        has_factor = FACTOR.search(text) or (
+            re.search(r"\d", text) and (_WORD.search(text) or "%" in text)
+        )
         is_product = re.search(r"[^\W\d_]\s*[*·/^]\s*\w", text)
         if not known and (has_factor or is_product):
             word = None if is_product else _WORD.search(text)
@@ -112,7 +144,8 @@ def _outside_of_brackets(name: str) -> UnitInName | None:
     last = matches[-1]
     unit = _written(last[0])
     decides = last.re is _WORD and (unit is None or _is_plain(last[0], unit))
-    return UnitInName(_without(name, last), unit, decides)
+    doubt = GRAD if last[0].startswith("grad") and unit in ("deg", "deg/s") else ""
+    return UnitInName(_without(name, last), unit, decides, doubt=doubt)
 
 
 def _without(name: str, match: re.Match[str]) -> str:

@@ -10,6 +10,7 @@ from pipelines.importing.quantities.expression import Expression
 from pipelines.importing.quantities.numbers import TAKEN_FOR_MISSING, numbers
 from pipelines.importing.quantities.wraparound import (
     full_at,
+    note_guessed_turns,
     sawtooth,
     sign_bit,
     signed,
@@ -33,6 +34,7 @@ def quantity(
     columns: Mapping[str, NDArray],
     where: str,
     note: Note,
+    time_s: NDArray,
     *,
     turns: bool = False,
 ) -> NDArray:
@@ -50,6 +52,8 @@ def quantity(
         Name of the quantity in errors.
     note : callable
         Takes what is reported about the reading.
+    time_s : (n,) array
+        Times of the rows, s, NaN where missing.
     turns : bool, optional
         Whether it is the angle of a joint that turns without end, and is unwrapped in any case.
 
@@ -85,6 +89,7 @@ def quantity(
         # The joint's zero as a raw reading: most joints begin less than half a turn from it.
         near = reading.zero / reading.scale if reading.begins_at is None else reading.begins_at
         raw = unwrapped(raw, wraps_at, note, near)
+        note_guessed_turns(time_s, raw, wraps_at, note)
     return reading.sign * gain * (unit.factor * (reading.scale * raw - reading.zero) + unit.offset)
 
 

@@ -67,7 +67,7 @@ def whole_nanoseconds(values: NDArray, written: str | None = None) -> NDArray:
 
     In ``31.01.2026 12:00:00,125`` the day comes first, as points separate the parts. With slashes,
     the dates show whether it does: no month is above 12, and midnight adds a day. Times of day
-    without a date are those of 1 January 1970.
+    without a date are those of 1 January 1970, as are minutes and seconds such as ``59:58.125``.
 
     Parameters
     ----------
@@ -101,7 +101,17 @@ def whole_nanoseconds(values: NDArray, written: str | None = None) -> NDArray:
         dates = pd.to_datetime(
             "1970-01-01T" + text.astype("str"), errors="coerce", format="ISO8601", utc=True
         )
+    if dates.isna().all():
+        dates = _minutes(text)
     return _nanoseconds(_in_other_words(text) if dates.isna().all() else dates)
+
+
+def _minutes(text: pd.Series) -> pd.Series:
+    """Return minutes and seconds (n,) as dates; without a fraction they may be hours."""
+    parts = text.str.extract(r"^(\d{1,4}):([0-5]\d\.\d{1,9})$").astype("string")
+    since = pd.to_timedelta("00:00:" + parts[1], errors="coerce")
+    since += pd.to_timedelta(pd.to_numeric(parts[0]).astype(float), unit="min")
+    return pd.Timestamp("1970-01-01", tz="UTC") + since
 
 
 def _nanoseconds(dates: pd.Series) -> NDArray:

@@ -4,9 +4,11 @@ from collections.abc import Iterable
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import median_filter
 
 from pipelines.importing.finding import Note, counted, unnoted
 from pipelines.importing.quantities.numbers import TAKEN_FOR_MISSING
+from pipelines.signals.sampling import missing_samples
 
 # Every width, as encoders also have 12, 14 or 17 bits, and wrap at their own modulus.
 REGISTERS = tuple(2.0**bits for bits in range(8, 33))
@@ -162,6 +164,43 @@ def unwrapped(values: NDArray, modulus: float, note: Note = unnoted, near: float
         )
         note(seen, action)
     return unwrapped_values
+
+
+def note_guessed_turns(
+    time_s: NDArray, unwrapped_values: NDArray, modulus: float, note: Note = unnoted
+) -> None:
+    """Report the gaps after which a counter may be in another turn than was assumed.
+
+    At the fastest speed of the log, the counter moves by more than half of its modulus there.
+
+    Parameters
+    ----------
+    time_s : (n,) array
+        Times, s, NaN where missing.
+    unwrapped_values : (n,) array
+        Readings that go on across wraparounds, NaN where missing.
+    modulus : float
+        Reading at which the counter starts again at 0.
+    note : callable
+        Takes what is reported about the counter.
+    """
+    known = np.isfinite(time_s) & np.isfinite(unwrapped_values)
+    time, rows = np.unique(time_s[known], return_index=True)
+    if len(time) < 4:
+        return
+    steps, is_gap = np.diff(time), missing_samples(time) > 0
+    speeds = (np.diff(unwrapped_values[known][rows]) / steps)[~is_gap]
+    if not is_gap.any() or not len(speeds):
+        return
+    # A median of three tolerates an outlier, which is a step there and one back.
+    fastest = float(np.max(np.abs(median_filter(speeds, 3, mode="nearest"))))
+    guessed = is_gap & (fastest * steps > 0.5 * modulus)
+    if guessed.any():
+        seen = (
+            f"may move by more than half of {modulus:g} in"
+            f" {counted(int(guessed.sum()), 'gap')}, the first at {time[:-1][guessed][0]:.6g} s"
+        )
+        note(seen, "the turn after each is a guess; set span_s so that no [[recording]] has one")
 
 
 def full_at(values: NDArray, turns: Iterable[float]) -> float | None:

@@ -65,6 +65,7 @@ def header(above: Sequence[Line], width: int, counts_rows: bool) -> Header:
 
 def _names(lines: Sequence[Line]) -> tuple[str, ...]:
     """Return the names in the last of lines of equal width, with those above that it belongs to."""
+    lines = _without_descriptions(lines)
     last, over = lines[-1], _over(lines[:-1])
     if over and _are_units(last):
         return tuple(
@@ -76,6 +77,15 @@ def _names(lines: Sequence[Line]) -> tuple[str, ...]:
     if over and len(set(named)) < len(named):
         return tuple(_part(name, part) for name, part in zip(over, last, strict=True))
     return _filled(last)
+
+
+def _without_descriptions(lines: Sequence[Line]) -> Sequence[Line]:
+    """Return the lines up to that of the units, if each column has a name of its own above it."""
+    for k in range(1, len(lines) - 1):
+        names = set(lines[k - 1])
+        if _are_units(lines[k]) and "" not in names and len(names) == len(lines[k - 1]):
+            return lines[: k + 1]
+    return lines
 
 
 def _is_x(name: str) -> bool:

@@ -26,6 +26,11 @@ DAY_NS = 86_400_000_000_000
 """A day, ns."""
 HOUR_S = 3600.0
 """An hour, s."""
+SET_BACK = {
+    1.0: "as at the end of summer time",
+    12.0: "as a 12-hour clock without AM and PM",
+}
+"""Hours by which written clocks go back without a pause, and the likely cause."""
 NEAR = 0.01
 """Distance from its modulus, as a share, within which a counter is full."""
 SLOWEST_HZ, FASTEST_HZ = 10.0, 1e4
@@ -437,6 +442,12 @@ def full_clock(before: float, after: float, step: float, count_s: float) -> floa
     return moduli[0] if moduli else None
 
 
+def _set_back(back_s: float, step_s: float) -> float | None:
+    """Return the whole hours by which a clock was set back without a pause, if any."""
+    fits = (hours for hours in SET_BACK if 0.0 < hours * HOUR_S - back_s <= 20.0 * step_s)
+    return next(fits, None)
+
+
 def is_usual_modulus(modulus: float, count_s: float) -> bool:
     """Return whether a clock wraps around as registers or clocks of the day do.
 
@@ -477,7 +488,10 @@ def _note_restarts(
         action = "another run begins" if len(places) == 1 else "each time another run begins"
         if full is not None:
             before = float(raw[rows[first - 1]])
-            action = f"after {before:.10g}: if it was full, set time.wraps_at = {full:.12g}"
+            action = f"after {before:.10g}: if it was full, set time.wraps_at = {full:.14g}"
+        elif (hours := _set_back(back, step * count_s)) is not None:
+            modulus = _in_counts(hours * HOUR_S, count_s)
+            action = f"{SET_BACK[hours]}: if that is so, set time.wraps_at = {modulus:.14g}"
         note(f"clock starts over{times} at row {rows[first]}, {back:.6g} s back", action)
 
 

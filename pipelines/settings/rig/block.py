@@ -111,4 +111,5 @@ def check_counter(register: Register, name: str) -> None:
         raise ValueError(
             f"{name}: found {register.type} with scale {register.scale:g} and offset"
             f" {register.offset:g}, expected {', '.join(others)} or {last} without scale or offset"
+            f"{'; remove sign_bit' if register.sign_bit is not None else ''}"
         )

@@ -82,11 +82,19 @@ class Register(Settings):
     scale: float = Field(1.0, description="Units per count; negative turns the sign.")
     offset: float = Field(0.0, ge=-1e12, le=1e12, description="Value at a raw 0, in the unit.")
     unit: Unit = Field("1", description="Unit of the scaled value.")
+    sign_bit: int | None = Field(
+        None, ge=3, le=62, description="Bit that is set below zero, where the rest is a magnitude."
+    )
 
     @model_validator(mode="after")
     def _is_possible(self) -> Self:
         if self.scale == 0.0:
             raise ValueError("scale: found 0, expected units per count")
+        if self.sign_bit is not None and self.sign_bit >= self._unsigned_bits:
+            raise ValueError(
+                f"sign_bit: found {self.sign_bit} of a register of type {self.type}, expected a bit"
+                " of an unsigned type; set type to uint16, uint32 or uint64"
+            )
         if self.address + self.registers > 65536:
             raise ValueError(
                 f"address: found {self.address}, but a {self.type} there ends beyond address 65535"
@@ -121,13 +129,20 @@ class Register(Settings):
     @property
     def is_unsigned(self) -> bool:
         """Whether it is a count from 0, which wraps around."""
-        return STRUCT_CODES[self.type].isupper()
+        return self._unsigned_bits > 0 and self.sign_bit is None
+
+    @property
+    def _unsigned_bits(self) -> int:
+        """The bits of an unsigned type; 0 for others."""
+        return int(self.type.removeprefix("uint")) if STRUCT_CODES[self.type].isupper() else 0
 
     @property
     def counts(self) -> tuple[int, int] | None:
         """The least and the greatest count of an integer; None for a float."""
         if STRUCT_CODES[self.type] in "fd":
             return None
+        if self.sign_bit is not None:
+            return 1 - 2**self.sign_bit, 2**self.sign_bit - 1
         bits = int(self.type.removeprefix("u").removeprefix("int"))
         if self.is_unsigned:
             return 0, 2**bits - 1
