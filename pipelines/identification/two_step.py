@@ -188,7 +188,7 @@ def identify(
 def _unmeasured(machine: Machine) -> list[str]:
     """Return a remark on joints whose torque was not measured."""
     words = machine.unmeasured_in_words
-    return [f"{words}. Parameters that do not act on these are left out"] if words else []
+    return [f"{words}; parameters that do not act on these are left out"] if words else []
 
 
 def _limits(estimator: Estimator, training: Training, has_converged: bool) -> Iterator[str]:

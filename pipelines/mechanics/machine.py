@@ -87,7 +87,7 @@ class Machine:
         inputs = (
             "its motion is a known input" if len(names) == 1 else "their motions are known inputs"
         )
-        return f"The torque of {' and '.join(names)} was not measured: {inputs} of the other joints"
+        return f"the torque of {' and '.join(names)} was not measured: {inputs} of the other joints"
 
     def refuse_unmeasured(self, source: Any, use: str) -> None:
         """Refuse a machine with a joint whose torque was not measured.

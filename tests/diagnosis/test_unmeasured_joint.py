@@ -83,7 +83,7 @@ def test_nothing_is_missing_of_it_whichever_torque_was_not_recorded(tables, join
     other = {"shoulder": "elbow", "elbow": "shoulder"}[joint]
     by_joint = ("noise_floor_nm", "baseline_rmse_nm", "router", "error_budget", "units")
     assert all(set(outcome[key]) == {other} for key in (*by_joint, "depends_on"))
-    assert outcome["caveats"][0].startswith(f"The torque of the {joint} was not measured")
+    assert outcome["caveats"][0].startswith(f"the torque of the {joint} was not measured")
 
 
 def test_a_spring_at_the_shoulder_is_named_with_its_size(tables):

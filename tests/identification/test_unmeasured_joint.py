@@ -107,7 +107,7 @@ def test_the_knee_is_identified_though_a_brake_holds_the_hip_at_other_angles(cou
     assert list(found.parameters["name"]) == ["X2", "X3", "coulomb", "viscous"]
     assert set(found.validation.as_json()["all"]) == {"knee"}
     (remark,) = found.remarks
-    assert remark.startswith("The torque of the hip was not measured")
+    assert remark.startswith("the torque of the hip was not measured")
 
 
 def test_without_gravity_a_flickering_encoder_gives_no_coupling_of_the_links():
@@ -134,7 +134,7 @@ def test_a_load_converges_though_the_hip_s_own_inertia_is_unknown():
     runs = motions()
     terms = chosen(["load_dependent_friction@knee"], runs[0].machine, runs)
     (remark,) = identify(runs, extension=Extension().with_terms(terms)).remarks
-    assert remark.startswith("The torque of the hip was not measured")
+    assert remark.startswith("the torque of the hip was not measured")
 
 
 def test_a_torque_that_is_in_the_file_is_ignored_at_such_a_joint():
@@ -151,7 +151,7 @@ def test_every_method_that_fits_equations_recovers_the_knee(method):
 
 @pytest.mark.parametrize("method", ["realizable", "oe", "iv"])
 def test_methods_that_need_every_torque_say_so(method):
-    said = r"The torque of the hip was not measured.* This method needs a machine whose joints all"
+    said = r"the torque of the hip was not measured.* This method needs a machine whose joints all"
     with pytest.raises(InputError, match=said):
         identify(motions(), estimator_named(method))
 
