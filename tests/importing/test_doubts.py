@@ -323,6 +323,18 @@ def test_grad_in_lower_case_is_a_degree_in_doubt(guessed, pendulum, write_csv, n
     assert ("gon" in doubts.get("joint[0].angle.unit", "")) == (name == "winkel_grad")
 
 
+@pytest.mark.parametrize(("in_turn", "is_gon"), [(400.0, True), (360.0, False)])
+def test_a_velocity_in_rad_shows_that_grad_is_a_gon(guessed, pendulum, write_csv, in_turn, is_gon):
+    columns = {
+        "time": pendulum.time,
+        "winkel_grad": pendulum.angle * in_turn / (2.0 * np.pi),
+        "omega_rad_s": pendulum.velocity,
+        "tau_Nm": pendulum.torque,
+    }
+    _, doubts = guessed(write_csv(columns))
+    assert ("set scale = 0.9" in doubts["joint[0].angle.unit"]) == is_gon
+
+
 @pytest.mark.parametrize("name", ["tau_PI [Nm]", "pi_controller_torque [Nm]", "half_angle [rad]"])
 def test_a_word_before_no_unit_is_no_factor(name):
     column = meaning(name)

@@ -91,6 +91,11 @@ def guess_units(
         share = 0.0 if agreement is None else agreement.explained
         doubt = f"does not integrate to the angle ({share:.0%} of its variance)"
         return Units(unit, why, sure, velocity_named or VELOCITY_OF[unit], doubt, False)
+    if doubt and velocity_named and UNITS[velocity_named].dimension == "angular velocity":
+        # 400 gons are a turn. A velocity in gons, too, would integrate to the whole angle.
+        gon = abs(_turns(agreement.slope, unit, velocity_named)) / 0.9
+        if abs(gon - 1.0) < EXACT:
+            why += "; the velocity shows that it is: set scale = 0.9"
     if unit == "counts":
         units = Units(unit, why, sure, *_velocity_of_counts(velocity_named, agreement.slope, sure))
         of_velocity = UNITS[units.velocity]
