@@ -52,7 +52,7 @@ def screened(
         # A candidate has a column for each direction to which its effect is proportional.
         starts = [Candidate(effect, (some[0],) * len(runs), tuple(some)) for some in chosen]
     elif any(p.per_run for p in effect.shape) and not transforms_motion(effect):
-        starts = [_from_the_begin(effect, len(runs))]
+        starts = [_from_the_start(effect, len(runs))]
     else:
         starts = [
             Candidate(effect, (shape,) * len(runs)) for shape in _grid(effect, runs, regression)
@@ -206,7 +206,7 @@ def _rhythms(effect: Effect, runs: Sequence[Run], regression: DecisionRegression
     return tried[peaks[np.argsort(-power[peaks])]].tolist()
 
 
-def _from_the_begin(effect: Effect, runs: int) -> Candidate:
+def _from_the_start(effect: Effect, runs: int) -> Candidate:
     """Return an effect with an onset, present from the start on; its instants are sought later."""
     defaults = [ALWAYS if p.per_run else p.default or 0.0 for p in effect.shape]
     return Candidate(effect, (tuple(defaults),) * runs)

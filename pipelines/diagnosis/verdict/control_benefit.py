@@ -64,7 +64,7 @@ def _tracked(
     model: Model, run: str, case: SimulateSettings, d: Diagnosis
 ) -> dict[str, dict[str, float]]:
     motion = d.validate[0].motion
-    terms = tuple(_from_the_begin(term) for term in model)
+    terms = tuple(_from_the_start(term) for term in model)
     loop = track(
         make_plant(Model(terms), motion.geometry, joints_of(motion.metadata), run), case, gait()
     )
@@ -81,7 +81,7 @@ def _tracked(
     }
 
 
-def _from_the_begin(term: Term) -> Term:
+def _from_the_start(term: Term) -> Term:
     """Return a term whose onset is the run's start, as the loop might end before it."""
     # Onsets are the only per-run values in seconds.
     onset = [p.per_run and p.unit == "s" for p in term.effect.fitted]
