@@ -101,7 +101,7 @@ class Series:
         if register.turn:
             values = list(map(Unwrapper(register.turn), values))
         if counts:
-            # By the span of the register under test: another type wraps around elsewhere.
+            # By the modulus of the register under test: another type wraps around elsewhere.
             values = list(map(Unwrapper(one.modulus(name)), values))
         return np.array(values)
 

@@ -38,7 +38,7 @@ class Drive:
         self._status_block = Block({"status": self.map.read.status or self.map.read.sequence})
         self._heartbeat = 0
         has_heartbeat = self.map.write.heartbeat is not None
-        self._heartbeat_span = int(self.write_block.modulus("heartbeat")) if has_heartbeat else 1
+        self._heartbeat_modulus = int(self.write_block.modulus("heartbeat")) if has_heartbeat else 1
         self._unwrap_sequence = Unwrapper(self.read_block.modulus("sequence"))
         self._unwrap_time = Unwrapper(self.read_block.modulus("time"))
         self.bounds: Bounds | None = None
@@ -258,7 +258,7 @@ class Drive:
 
     def _encode(self, control: int, reference: float) -> list[int]:
         # A drive with such a register counts only a changed value as a sign of life.
-        self._heartbeat = (self._heartbeat + 1) % self._heartbeat_span
+        self._heartbeat = (self._heartbeat + 1) % self._heartbeat_modulus
         return self.write_block.encode(
             {"reference": reference, "control": control, "heartbeat": self._heartbeat}
         )

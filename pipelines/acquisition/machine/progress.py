@@ -27,8 +27,8 @@ class Progress:
     def __init__(self, label: str, block: Block, rate_hz: float) -> None:
         """Follow a device with a label, whose counter is expected at a rate."""
         self._label, self._rate_hz = label, rate_hz
-        self._span = block.modulus("sequence")
-        self._clock_span = block.modulus("time") if "time" in block.names else 0.0
+        self._modulus = block.modulus("sequence")
+        self._clock_modulus = block.modulus("time") if "time" in block.names else 0.0
         self._first: Instant | None = None
         self._last: Instant | None = None
 
@@ -49,10 +49,10 @@ class Progress:
         """
         sequence, seconds = values["sequence"], values.get("time")
         if self._last:
-            sequence = unwrap(sequence, self._last.sequence, self._span)
+            sequence = unwrap(sequence, self._last.sequence, self._modulus)
             if seconds is not None:
                 assert self._last.time is not None
-                seconds = unwrap(seconds, self._last.time, self._clock_span)
+                seconds = unwrap(seconds, self._last.time, self._clock_modulus)
         now = Instant(int(sequence), seconds, asked, answered)
         if self._last and self._last.sequence == now.sequence:
             return now

@@ -45,7 +45,7 @@ class Ring:
         self._note_newest = note_newest
         self._newest = Block({"newest": settings.newest})
         self._record = Block(registers_of(settings.record))
-        self._span = int(self._record.modulus("sequence"))
+        self._modulus = int(self._record.modulus("sequence"))
         self._function = settings.function
         self._address, self._capacity = settings.address, settings.capacity
         self._words = settings.words
@@ -105,7 +105,7 @@ class Ring:
             self._newest.address, self._newest.count, function=self._function, in_motion=True
         )
         value = self._newest.decode(words)["newest"]
-        newest_now = int(unwrap(value, newest, self._span))
+        newest_now = int(unwrap(value, newest, self._modulus))
         # So far from the expected number, all records are overwritten, or the reply is damaged.
         if abs(newest_now - newest) > self._capacity:
             newest_now = newest + self._capacity
@@ -127,7 +127,7 @@ class Ring:
             record = self._record.decode(
                 words[self._record.address : self._record.address + self._record.count]
             )
-            if record["sequence"] == number % self._span:
+            if record["sequence"] == number % self._modulus:
                 records.append((number, record))
             elif self._read_again is None or number > self._read_again:
                 self._read_again = self._next = number
@@ -143,7 +143,7 @@ class Queue:
         self._device = device
         self._address, self._words = settings.fifo, settings.words
         self._record = Block(registers_of(settings.record))
-        self._span = self._record.modulus("sequence")
+        self._modulus = self._record.modulus("sequence")
         self.block = settings.records_per_read
         self._reads = _most_reads(settings, samples_per_cycle)
         self._began: int | None = None
@@ -183,7 +183,7 @@ class Queue:
         for _ in range(self._reads):
             read = await self._read()
             # Near the newest sample: a record's own number wraps around.
-            numbers = [int(unwrap(record["sequence"], newest, self._span)) for record in read]
+            numbers = [int(unwrap(record["sequence"], newest, self._modulus)) for record in read]
             self._fetched += [
                 (number, record)
                 for number, record in zip(numbers, read, strict=True)

@@ -4,8 +4,8 @@ RATE_TOLERANCE = 0.05
 """Largest relative difference between a device's rate and the expected one."""
 
 
-def unwrap(value: float, near: float, span: float) -> float:
-    """Return a value plus the multiple of its register's span that is closest to another.
+def unwrap(value: float, near: float, modulus: float) -> float:
+    """Return a value plus the multiple of its register's modulus that is closest to another.
 
     Parameters
     ----------
@@ -13,22 +13,22 @@ def unwrap(value: float, near: float, span: float) -> float:
         As the register shows it.
     near : float
         Where the result is expected.
-    span : float
-        Modulus of the register; 0 for one without wraparound.
+    modulus : float
+        Value at which the register starts again at 0; 0 for one without wraparound.
     """
-    return value + span * round((near - value) / span) if span else value
+    return value + modulus * round((near - value) / modulus) if modulus else value
 
 
 class Unwrapper:
     """Removes the wraparounds of successive values, which may go forwards or backwards."""
 
-    def __init__(self, span: float) -> None:
-        self._span = span
+    def __init__(self, modulus: float) -> None:
+        self._modulus = modulus
         self._last: float | None = None
 
     def __call__(self, value: float) -> float:
         """Return the next value without wraparound."""
-        self._last = value if self._last is None else unwrap(value, self._last, self._span)
+        self._last = value if self._last is None else unwrap(value, self._last, self._modulus)
         return self._last
 
 
