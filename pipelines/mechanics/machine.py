@@ -74,6 +74,11 @@ class Machine:
         return np.array([joint.is_measured for joint in self.joints])
 
     @property
+    def measured_indices(self) -> list[int]:
+        """Indices of the joints whose torque is known."""
+        return [j for j, joint in enumerate(self.joints) if joint.is_measured]
+
+    @property
     def measured_names(self) -> tuple[str, ...]:
         """Names of the joints whose torque is known."""
         return tuple(joint.name for joint in self.joints if joint.is_measured)

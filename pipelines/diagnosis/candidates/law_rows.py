@@ -146,7 +146,7 @@ def curve_rows(
         # The constant counts as the slowest cosine, as pink noise has no finite density at 0.
         hz = np.maximum(np.arange(len(variance)), 1) / (2.0 * duration)
         noise = 2.0 * prepared.noise.excess(hz, LENGTH_S)[: regression.joints] / duration
-        for j in np.flatnonzero(run.motion.machine.measured).tolist():
+        for j in run.motion.machine.measured_indices:
             parts = [np.zeros((*other.measured.shape, len(variance))) for other in prepared.runs]
             parts[r][:, j] = curves * prepared.torque[j]
             share = np.nan_to_num(noise[j] / prepared.torque[j] ** 2)

@@ -115,7 +115,7 @@ def smooth_laws(run: Run, spans: Spans, load: NDArray) -> tuple[list[LawColumn],
     laws: list[LawColumn] = []
     parts: list[tuple[int | slice, NDArray]] = []
     # The torque at a joint where it was not measured shows nothing.
-    for j in np.flatnonzero(run.motion.machine.measured).tolist():
+    for j in run.motion.machine.measured_indices:
         for kind, degree, column in _laws_of(run, spans, load, j):
             # Real laws are smooth: the prior variance falls with the degree.
             laws.append(LawColumn(kind, j, "all", 1.0 / (1.0 + degree)))

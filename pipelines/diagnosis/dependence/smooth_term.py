@@ -86,7 +86,7 @@ def smooth_term(runs: Sequence[Run], residuals: Sequence[NDArray]) -> SmoothTerm
     -------
     SmoothTerm
     """
-    joints = np.flatnonzero(runs[0].motion.machine.measured).tolist()
+    joints = runs[0].motion.machine.measured_indices
     terms = [_of_joint(runs, [r[:, j] for r in residuals], j) for j in joints]
     return SmoothTerm(tuple(surface for surface in terms if surface is not None))
 

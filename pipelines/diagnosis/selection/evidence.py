@@ -239,7 +239,7 @@ def _elements(library: Library, at: _Places) -> list[Element]:
     names = machine.names
     # A law is one element with all of its columns: none of them is missing by itself.
     laws = _laws_by_kind(library.laws, at.laws)
-    for j in np.flatnonzero(machine.measured).tolist():
+    for j in machine.measured_indices:
         own = [
             (int(p), c.variance)
             for p, c in zip(at.curves, library.curves, strict=True)

@@ -20,7 +20,7 @@ from pipelines.wording.label import number
 def figure(d: Diagnosis, verdict: Verdict) -> Figure:
     """Draw angle, angle error, torque and torque error of each measured joint, a column each."""
     joints, stretch = d.baseline.machine.measured_names, worst_stretch(d)
-    places = np.flatnonzero(d.baseline.machine.measured).tolist()
+    places = d.baseline.machine.measured_indices
     drawn, axes = plt.subplots(
         4,
         len(joints),
@@ -120,7 +120,7 @@ def _angles(
 ) -> None:
     simulated = simulated_error(validated, d, stretch)
     motion = d.validate[stretch.run].motion
-    places = np.flatnonzero(d.baseline.machine.measured).tolist()
+    places = d.baseline.machine.measured_indices
     for j, angle, error in zip(places, angles, errors, strict=True):
         if simulated is None:
             angle.plot([], [], color=colour, lw=2, label=f"{name} (cannot be simulated)")
@@ -142,7 +142,7 @@ def _torques(
 ) -> None:
     run = d.validate[stretch.run]
     blocks = stretch.within(run.time)
-    places = np.flatnonzero(d.baseline.machine.measured).tolist()
+    places = d.baseline.machine.measured_indices
     for j, torque, error in zip(places, torques, errors, strict=True):
         known = run.usable[blocks, j]
         # NaN breaks the line near reversals, where no model is fitted.
