@@ -185,8 +185,9 @@ def _sums(problem: Problem, values: NDArray, scale: NDArray, loss: Loss) -> Sums
         # A median needs all residuals at once, so sizes are kept and sums are not enough.
         for j, size in enumerate(sizes):
             size.append(np.abs(residual[r.usable[:, j], j]))
-    # A joint whose torque was not measured has no residuals.
-    residuals = [np.concatenate([*size, [0.0] * (not any(map(len, size)))]) for size in sizes]
+    residuals = [np.concatenate(size) for size in sizes]
+    # A joint whose torque was not measured has no residuals, and a median needs one.
+    residuals = [size if len(size) else np.zeros(1) for size in residuals]
     return Sums(
         normal,
         slope,
