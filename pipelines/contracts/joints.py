@@ -102,12 +102,6 @@ class Joint:
         return "torque" if self.kind == "revolute" else "force"
 
 
-AT_REST = (
-    'for a joint that rests in all runs set drive = "unmeasured" if its angle matters, or leave it'
-    " out"
-)
-"""What to do about a joint that rests in all runs."""
-
 HIP_AND_KNEE = (Joint("hip"), Joint("knee"))
 
 

@@ -5,8 +5,8 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from pipelines.contracts.joints import AT_REST
 from pipelines.errors import NotIdentifiable
+from pipelines.mechanics.remedies import AT_REST
 
 
 def inverse(gram: NDArray, names: Sequence[str]) -> NDArray:

@@ -7,9 +7,10 @@ import numpy as np
 import pyarrow as pa
 from numpy.typing import NDArray
 
-from pipelines.contracts.joints import AT_REST, columns_of, joints_of
+from pipelines.contracts.joints import columns_of, joints_of
 from pipelines.errors import InputError
 from pipelines.estimation.regression import Regression, regressions, residual_of
+from pipelines.mechanics.remedies import AT_REST
 from pipelines.mechanics.run import Run
 from pipelines.model import Model
 

@@ -4,6 +4,12 @@ from collections.abc import Sequence
 
 from pipelines.mechanics.run import Run
 
+AT_REST = (
+    'for a joint that rests in all runs set drive = "unmeasured" if its angle matters, or leave it'
+    " out"
+)
+"""What to do about a joint that rests in all runs."""
+
 
 def settings_of(run: Run) -> str:
     """Return the file that describes a run's channels: the map of its import, or the rig file."""

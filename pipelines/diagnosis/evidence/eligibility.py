@@ -6,12 +6,12 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import NDArray
 
-from pipelines.contracts.joints import AT_REST, the
+from pipelines.contracts.joints import the
 from pipelines.errors import InputError
 from pipelines.estimation.regression import away_from_reversals, reversal_speeds
 from pipelines.mechanics.constant_torque import constant_torque
 from pipelines.mechanics.motion import Motion
-from pipelines.mechanics.remedies import settings_of
+from pipelines.mechanics.remedies import AT_REST, settings_of
 from pipelines.mechanics.run import refuse_several_machines
 
 

@@ -6,13 +6,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipelines.contracts.checks import LARGEST_ANGLE_RAD
-from pipelines.contracts.joints import AT_REST, in_words
+from pipelines.contracts.joints import in_words
 from pipelines.errors import InputError
 from pipelines.importing.finding import Finding, counted
 from pipelines.importing.quantities.consistency import MOST, SPAN, integral_agreement, whole_rows
 from pipelines.importing.quantities.wraparound import fill_value
 from pipelines.mechanics.geometry import Geometry
 from pipelines.mechanics.machine import known_in_words, machine_of, mechanisms_of
+from pipelines.mechanics.remedies import AT_REST
 from pipelines.settings.import_map import ImportMap, JointSettings
 
 STRONGEST = {"torque": 1e3, "force": 1e5}
