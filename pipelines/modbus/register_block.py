@@ -50,7 +50,7 @@ class Block:
         """
         raw = self._values_format.unpack(bytes(self._pick(self._words_format.pack(*words))))
         return {
-            name: (value if bit is None else _flipped(value, bit)) * scale + offset
+            name: (value if bit is None else _signed(value, bit)) * scale + offset
             for name, value, bit, (scale, offset) in zip(
                 self.names, raw, self._sign_bits, self._scales, strict=True
             )
@@ -107,6 +107,6 @@ class Block:
         return (limits[1] + 1) * register.si[0] if limits and limits[0] == 0 else 0.0
 
 
-def _flipped(raw: int, bit: int) -> int:
+def _signed(raw: int, bit: int) -> int:
     """Return the count of a register that holds a magnitude, and a bit that is set below zero."""
-    return raw if raw < 1 << bit else (1 << bit) - raw
+    return raw if raw < 2**bit else 2**bit - raw
