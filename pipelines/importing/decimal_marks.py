@@ -41,17 +41,19 @@ def have_thousands(texts: pd.Series, decimal: str) -> bool:
     marked = marked[marked.str.fullmatch(digits)]
     if marked.empty or not marked.str.fullmatch(thousands).all():
         return False
-    return bool(marked.str.contains(decimal, regex=False).any()) or _are_counted(
+    return bool(marked.str.contains(decimal, regex=False).any()) or _stand_from_1000_on(
         len(marked), [str(one).strip() for one in texts if pd.notna(one) and mark not in str(one)]
     )
 
 
-def _are_counted(marked: int, others: list[str]) -> bool:
-    """Return whether numbers below 1000 are whole and have no mark, though many from 1000 on have.
+def _stand_from_1000_on(marked: int, others: list[str]) -> bool:
+    """Return whether the marks stand in the numbers from 1000 on alone.
 
-    A logger that writes a decimal mark writes it in nearly all numbers, and in those below 1, too.
+    Many numbers have them, and as many others are whole and below 1000. A logger that writes a
+    decimal mark writes it in nearly all numbers, and in those below 1, too.
     """
-    enough = 10  # numbers of each kind
+    # Numbers of each kind that are no coincidence.
+    enough = 10
     plain = [text for text in others if re.fullmatch(r"[-+]?\d+([.,]\d*)?", text)]
     return (
         marked >= enough

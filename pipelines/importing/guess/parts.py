@@ -68,11 +68,9 @@ def _clocks(kinds: Sequence[Sequence[Meaning]]) -> list[str] | None:
         one = [m.quantity for m in shared] == ["time"]
         return [shared[0].column] * len(kinds) if one else None
     clocks = [[m.column for m in kind if m.quantity == "time"] for kind in kinds]
-    complete = any(
-        {"angle"} <= quantities and quantities & set(TURNING)
-        for quantities in ({m.quantity for m in kind} for kind in kinds)
-    )
-    if complete or any(len(own) != 1 for own in clocks):
+    quantities = [{m.quantity for m in kind} for kind in kinds]
+    is_log = any("angle" in own and own & set(TURNING) for own in quantities)
+    if is_log or any(len(own) != 1 for own in clocks):
         return None
     columns = [m.column for kind in kinds for m in kind if m.quantity != "time"]
     return [own[0] for own in clocks] if len(set(columns)) == len(columns) else None
