@@ -160,10 +160,15 @@ class Machine:
     @property
     def absorbs(self) -> Mapping[str, str]:
         """Kinds of torque that the parameters absorb completely, as ``Mechanism.absorbs``."""
-        # The only drive fixes the scale of all parameters, so a gain of its torque does not show.
-        one_drive = sum(joint.has_sensor for joint in self.joints) == 1
-        gain = {"gain": "all parameters together"} if one_drive else {}
+        # A single reading fixes the scale of all parameters, so its gain does not show.
+        one_reading = sum(joint.has_sensor for joint in self.joints) == 1
+        gain = {"gain": "all parameters together"} if one_reading else {}
         return {**self.mechanism.absorbs, **gain}
+
+    @property
+    def is_leg(self) -> bool:
+        """Whether it has a leg's equations, with or without gravity."""
+        return self.mechanism.name == LEG.name
 
     @property
     def is_exoskeleton(self) -> bool:

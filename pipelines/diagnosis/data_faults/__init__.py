@@ -23,7 +23,6 @@ from pipelines.diagnosis.data_faults.sign_bit import sign_bit_faults
 from pipelines.diagnosis.data_faults.timing import timing_faults
 from pipelines.diagnosis.data_faults.units import angle_unit_faults, torque_unit_faults
 from pipelines.diagnosis.data_faults.wiring import angle_faults, cuff_faults, wiring_faults
-from pipelines.mechanics.mechanisms.leg import LEG
 from pipelines.mechanics.motion import Motion
 
 LEAST_S, LEAST_SHARE = 5.0, 0.5
@@ -63,7 +62,7 @@ def find_faults(motions: Sequence[Motion], accept: Sequence[FaultKind] = ()) -> 
         # One wrong channel makes later checks fail as well, so only the first kind is reported.
         wrong = wrong or [*sign_faults(motion)]
         faults += wrong
-        compares = _has_two_drives(motion) and not wrong and motion.file not in copied
+        compares = _has_two_torques(motion) and not wrong and motion.file not in copied
         run = averages(motion) if compares else None
         legs += [] if run is None else [run]
     faults += _of_legs(legs)
@@ -72,11 +71,10 @@ def find_faults(motions: Sequence[Motion], accept: Sequence[FaultKind] = ()) -> 
     return sorted(judged, key=lambda fault: files.index(fault.file))
 
 
-def _has_two_drives(motion: Motion) -> bool:
-    """Return whether a motion is of a leg whose joints both have a drive."""
+def _has_two_torques(motion: Motion) -> bool:
+    """Return whether a motion is of a leg whose torques are both readings."""
     machine = motion.machine
-    is_leg = machine.mechanism.name == LEG.name
-    return is_leg and all(joint.has_sensor for joint in machine.joints)
+    return machine.is_leg and all(joint.has_sensor for joint in machine.joints)
 
 
 def _of_legs(runs: Sequence[Averages]) -> list[Fault]:

@@ -62,7 +62,7 @@ def channel_faults(motion: Motion) -> Iterator[Fault]:
     yield from _copied(motion)
     for joint in range(motion.torque.shape[1]):
         yield from _stuck_angle(motion, joint)
-        # A passive joint's torque is zero throughout, and no channel.
+        # Without a sensor the torque is zero throughout, and no channel.
         if motion.machine.joints[joint].has_sensor:
             yield from _torque(motion, joint)
     if motion.held_forces is not None and motion.run == "with_human":

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import nnls
 
-from pipelines.mechanics.mechanisms.leg import LEG, cuff_torque
+from pipelines.mechanics.mechanisms.leg import cuff_torque
 from pipelines.mechanics.mechanisms.single import PENDULUM
 from pipelines.mechanics.motion import Motion
 from pipelines.signals.blocks import BlockAverage
@@ -86,14 +86,9 @@ class Averages:
 
     @property
     def joints(self) -> list[int]:
-        """Numbers of the joints that have a drive."""
+        """Numbers of the joints whose torque is a reading."""
         joints = self.motion.machine.joints
         return [j for j, joint in enumerate(joints) if joint.has_sensor]
-
-    @property
-    def is_leg(self) -> bool:
-        """Whether the machine has a leg's equations, with or without gravity."""
-        return self.motion.machine.mechanism.name == LEG.name
 
     def body(self, reading: Reading = AS_RECORDED) -> NDArray:
         """Return torque per unit of a leg's (X1 - X2, X2, X3, X4) under a reading.
@@ -108,7 +103,7 @@ class Averages:
         Returns
         -------
         (m, 2, 4) array
-            N·m per unit.
+            N·m per unit; (m, 2, 3) without gravity.
         """
         order, sign = reading
         q, dq, ddq = (x[:, list(order)] * sign for x in (self.q, self.dq, self.ddq))
@@ -134,7 +129,7 @@ class Averages:
 
     def _body_of(self, joint: int, reading: Reading) -> tuple[NDArray, NDArray]:
         """Return a joint's columns of parameters that cannot be negative, and of the others."""
-        if self.is_leg:
+        if self.motion.machine.is_leg:
             # X1 - X2 and X4 make no torque at the knee.
             body = self.body(reading)[:, joint, slice(1, 3) if joint else slice(None)]
             return body, body[:, :0]

@@ -47,7 +47,7 @@ def caveats(d: Diagnosis) -> list[str]:
 def floor_that_hides(d: Diagnosis) -> dict[str, float]:
     """Return joints whose noise floor is high, with its share of their torque."""
     parts = zip(d.baseline.machine.joints, d.floor_rms, d.torque_rms, strict=True)
-    # A passive joint's torque is zero.
+    # Without a sensor the torque is zero here.
     shares = {joint.name: float(f / t) for joint, f, t in parts if joint.has_sensor}
     # Share of a joint's torque above which a noise floor is doubtful: no sensor is as noisy, and
     # friction is seldom more.
