@@ -205,14 +205,13 @@ def _laws_of(run: Run, spans: Spans, load: NDArray, j: int) -> Iterator[LawTerm]
         q, run.state[1] / spans.speed, run.state[2] / spans.acceleration, load / spans.torque
     )
     joints = run.motion.machine.joints
+    # Half waves over the longest run: the slowest change is a single rise or fall.
+    phase = np.pi * (run.time - run.time[0]) / spans.duration_s
     yield from scaled.laws_of_itself(j)
     # A passive joint carries no load: what is predicted there is the residual itself, and a gain on
     # it would explain all of that.
     if joints[j].has_sensor:
         yield from scaled.laws_of_load(j)
-    # Half waves over the longest run: the slowest change is a single rise or fall.
-    phase = np.pi * (run.time - run.time[0]) / spans.duration_s
-    if joints[j].has_sensor:
         # A constant gain of the drives would let bodies without inertia explain that a passive
         # joint has no torque.
         lowest = 1 if any(joint.is_passive for joint in joints) else 0
