@@ -54,7 +54,7 @@ def stuck():
 
 def errors(rms):
     """Return errors of which each joint has this root mean square."""
-    return Errors(np.array([rms]) ** 2, np.array([1]), np.array(rms))
+    return Errors(np.array([rms]) ** 2, np.array([1]), np.array(rms), np.array([True, True]))
 
 
 def with_errors(d, floor, baseline, extended):

@@ -91,7 +91,7 @@ def removed_share(less: ValidationResult, whole: ValidationResult) -> float | No
         floor.
     """
     # Where the cause gains most: at other joints the share would be mostly noise.
-    joint = less.errors.falls_most(whole.errors)
+    joint = less.errors.joint_of_largest_fall(whole.errors)
     floor, without, with_it = (
         float(rms[joint]) for rms in (whole.floor.rms, less.errors.rms, whole.errors.rms)
     )

@@ -23,7 +23,7 @@ class Errors:
     """(b,)."""
     unmasked: NDArray
     """(J,) rms on every valid sample, N·m."""
-    measured: NDArray | bool = True
+    measured: NDArray
     """(J,) bool: joints whose torque is known; the error of the others is zero here."""
 
     @property
@@ -31,7 +31,7 @@ class Errors:
         """(J,) N·m over all scored samples."""
         return np.sqrt(self.squares.sum(axis=0) / max(self.counts.sum(), 1))
 
-    def falls_most(self, after: "Errors") -> int:
+    def joint_of_largest_fall(self, after: "Errors") -> int:
         """Return the joint at which another model's error is smaller by most."""
         return int(np.argmax(np.where(self.measured, self.rms - after.rms, -np.inf)))
 
@@ -115,7 +115,7 @@ def gain(before: Errors, after: Errors, joint: int | None = None, seed: int = 0)
         Seed of the random draws.
     """
     if joint is None:
-        joint = before.falls_most(after)
+        joint = before.joint_of_largest_fall(after)
     rng = np.random.default_rng(seed)
     blocks = len(before.counts)
     # Bootstrap samples of an interval.
