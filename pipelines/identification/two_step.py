@@ -30,7 +30,7 @@ from pipelines.identification.extension import Extension, refuse_unread
 from pipelines.identification.parameter_rows import rows
 from pipelines.identification.runs import train_and_validate
 from pipelines.identification.validation import Validation, validate
-from pipelines.mechanics.machine import THE_LEG, Machine
+from pipelines.mechanics.machine import Machine
 from pipelines.mechanics.run import Run, kinds_of
 from pipelines.mechanics.scale import on_one_scale
 from pipelines.model import Model, baseline, unrealizable, upside_down
@@ -131,8 +131,8 @@ def identify(
         If the motion cannot separate the parameters.
     """
     estimator, extension = estimator or WeightedLeastSquares(), extension or Extension()
-    estimator.refuse_unmeasured(motions[0].machine if motions else THE_LEG)
     train, judged = train_and_validate(on_one_scale(motions))
+    estimator.refuse_unmeasured(train[0].machine)
     loud = is_loud(train)
     refuse_unread(extension.terms, [*train, *judged])
     training, has_converged = _training(train, extension, reversals, CUTOFF_HZ if loud else None)
