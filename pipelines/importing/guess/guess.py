@@ -67,20 +67,15 @@ def propose(paths: Sequence[Path]) -> Proposal:
             raise InputError(_no_clock(names, columns))
     for path in paths[1:]:
         _check_columns(path, source, join)
-    by_rows = clocks_by_rows(time, columns) | dict(source.clocks)
-    first = time
-    time, clock_names = with_slowest(time, by_rows, names, columns, typed)
     # A clock without such a name is no angle, such as enc_ms of an encoder.
-    stamps = {first.column, *first.rivals}
+    stamps = {time.column, *time.rivals}
+    by_rows = clocks_by_rows(time, columns) | dict(source.clocks)
+    time, clock_names = with_slowest(time, by_rows, names, columns, typed)
     names = [replace(m, quantity="time", joint="") if m.column in stamps else m for m in names]
     of_clocks = own_clocks(clock_names.values(), time, names, columns, typed)
-    clocks = _onto_one_clock(
-        {name: of_clocks[one] for name, one in clock_names.items() if one in of_clocks},
-        time,
-        columns,
-    )
-    own = dict(clocks)
-    clocks |= _into_blank_rows(names, time, columns)
+    own = {name: of_clocks[one] for name, one in clock_names.items() if one in of_clocks}
+    own = _onto_one_clock(own, time, columns)
+    clocks = own | _into_blank_rows(names, time, columns)
     columns[time.column] = time.stamps(*(columns[name] for name in time.columns))
     # Within one run, because integrals and fits across a restart of the clock mean nothing.
     run = max(runs_of(columns[time.column], time.count_s), key=len)
