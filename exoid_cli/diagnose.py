@@ -109,12 +109,12 @@ def _write(
     output: Path,
     diagnosis: "Diagnosis",
     document: dict[str, Any],
-    drawn: "Verdict | None",
+    to_draw: "Verdict | None",
     motions: "Sequence[Motion]",
     files: Sequence[Path],
     settings: "Experiment",
 ) -> None:
-    """Write all files of a diagnosis or none, with the figures of ``drawn`` if it is given."""
+    """Write all files of a diagnosis or none, with the figures of ``to_draw`` if it is given."""
     from pipelines.contracts import describe
     from pipelines.contracts.atomic import all_or_none, write_text
     from pipelines.diagnosis.detectability.detectability import as_json, detectability
@@ -124,7 +124,7 @@ def _write(
     sections = ("mechanism", "filter", "diagnose")
     used_settings = settings.sections_about(machine.is_exoskeleton, *sections)
     shared = {"joints": machine.joint_metadata} | describe(files, used_settings)
-    model = _model(diagnosis, motions, files)
+    model = _about_model(diagnosis, motions, files)
     frames = {
         "parameters": diagnosis.parameters,
         "residuals": diagnosis.residuals,
@@ -141,15 +141,15 @@ def _write(
         for name, content in (("detectability", detectable), ("verdict", document)):
             text = json.dumps(content | {"provenance": shared}, indent=1, ensure_ascii=False)
             write_text(folder / f"{name}.json", f"{text}\n")
-        if drawn:
+        if to_draw:
             from pipelines.diagnosis.verdict.figures.drawing import draw
 
-            draw(diagnosis, drawn, folder)
+            draw(diagnosis, to_draw, folder)
         written = {path.name for path in folder.iterdir()}
     _remove_old_figures(output, written)
 
 
-def _model(
+def _about_model(
     diagnosis: "Diagnosis", motions: "Sequence[Motion]", files: Sequence[Path]
 ) -> dict[str, Any]:
     """Return the metadata of the extended model's parameters."""
