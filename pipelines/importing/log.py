@@ -306,7 +306,10 @@ def _channels(settings: ImportMap, source: Source) -> Iterator[Channel]:
 
 
 def _with_clock(reading: Reading, time: str | None, settings: ImportMap) -> Reading:
-    """Return a reading with what the map says of its clock, if only at another channel."""
+    """Return a reading with the unit and offset of its clock.
+
+    The map may have them at another channel of that clock.
+    """
     keys = ("time_unit", "time_scale", "time_offset_s")
     of_clock = (one for _, one in settings.readings() if one.time is not None and one.time == time)
     other = next((one for one in of_clock if one.model_fields_set & set(keys)), None)
