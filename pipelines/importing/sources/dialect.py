@@ -59,6 +59,11 @@ class Dialect:
         return f"{named} between fields and decimal {self.decimal!r}"
 
 
+def unknown_encoding(encoding: str) -> InputError:
+    """Return the error for an encoding in the map that Python does not know."""
+    return InputError(f"source.encoding: found {encoding!r}, expected one such as utf-8")
+
+
 def find_dialect(start: bytes, whole: bool, settings: SourceSettings) -> Dialect:
     """Derive the dialect of a text from its beginning, as far as it is not given.
 
@@ -80,9 +85,7 @@ def find_dialect(start: bytes, whole: bool, settings: SourceSettings) -> Dialect
     try:
         lines = re.split(r"\r\n?|\n", start.decode(encoding, errors="replace"))
     except LookupError as error:
-        raise InputError(
-            f"source.encoding: found {encoding!r}, expected one such as utf-8"
-        ) from error
+        raise unknown_encoding(encoding) from error
     # The limit of bytes may have cut the last line in two.
     lines = lines if whole else lines[:-1]
     skipped = settings.skip_rows or 0

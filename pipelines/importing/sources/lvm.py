@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from pipelines.errors import InputError
 from pipelines.importing.finding import counted
+from pipelines.importing.sources.dialect import unknown_encoding
 from pipelines.importing.sources.source import Columns, Source, numbered_twins
 from pipelines.importing.sources.text import open_text
 from pipelines.settings.import_map import SourceSettings
@@ -95,14 +96,13 @@ def open_lvm(path: Path, settings: SourceSettings) -> Source:
 
 
 def _decoded(content: bytes, settings: SourceSettings) -> str:
+    encoding = settings.encoding or "utf-8"
     try:
-        return content.decode(settings.encoding or "utf-8")
+        return content.decode(encoding)
     except UnicodeDecodeError:
         return content.decode("cp1252", errors="replace")
     except LookupError as error:
-        raise InputError(
-            f"source.encoding: found {settings.encoding!r}, expected one such as utf-8"
-        ) from error
+        raise unknown_encoding(encoding) from error
 
 
 def _tag(line: str) -> tuple[str, str]:
