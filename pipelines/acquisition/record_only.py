@@ -220,7 +220,7 @@ class _Recorder:
     def _whole(
         self, row: ReadOnlyRow, number: int, seconds: float, torn: TornRows[list[float]]
     ) -> list[list[float]]:
-        """Return the rows that are known to be whole once this one has come."""
+        """Note how long a row took; return the rows that are known to be whole now it has come."""
         self._widths.append(row.answered - row.asked)
         whole = torn.take([seconds, *row.values, number], number, row.values)
         self._torn_rows = torn.torn
