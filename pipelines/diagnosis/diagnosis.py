@@ -27,9 +27,9 @@ from pipelines.diagnosis.selection.answer import NamedCause
 from pipelines.diagnosis.selection.selection import Selection
 from pipelines.diagnosis.training_data import TrainingData
 from pipelines.effects import Effect
-from pipelines.effects.baseline import ForceSensorZero, RigidBody
+from pipelines.effects.baseline import ForceSensorZero
 from pipelines.estimation.collinearity import collinearities, profiled
-from pipelines.model import Column, unrealizable, upside_down
+from pipelines.model import Column, complete_bodies, unrealizable, upside_down
 
 
 @dataclass(frozen=True)
@@ -261,10 +261,7 @@ class Diagnosis:
         """Whether a rigid body's least inertia is negative by more than its standard error."""
         table = self.parameters.reset_index(drop=True)
         geometry = self.fitted_runs[0].motion.geometry
-        for _, rows in table[table["effect"] == RigidBody.name].groupby("run"):
-            # A body of which a part is not determined cannot be judged.
-            if len(rows) < len(self.baseline.machine.mechanism.parameters):
-                continue
+        for rows in complete_bodies(table, self.baseline.machine).values():
             own = rows.index.to_numpy()
             # Delta method: ``slope`` carries the parameters' covariance to the least inertia.
             least, _, slope = self.baseline.machine.mechanism.least_inertia(rows["value"], geometry)

@@ -15,12 +15,11 @@ from numpy.typing import NDArray
 from pipelines.contracts.joints import in_words, joints_of
 from pipelines.contracts.provenance import recording_behind
 from pipelines.contracts.table import Table
-from pipelines.effects import RUNS, Effect
-from pipelines.effects.baseline import RigidBody
+from pipelines.effects import Effect
 from pipelines.errors import InputError, about
 from pipelines.mechanics.machine import Machine
 from pipelines.mechanics.run import Run
-from pipelines.model import BASELINE, Term, terms_next_to_bodies
+from pipelines.model import BASELINE, Term, complete_bodies, terms_next_to_bodies
 from pipelines.model.per_run import guess, own_term
 from pipelines.wording.label import effect_at
 
@@ -260,9 +259,5 @@ def _critical(table: Table) -> float:
 
 def _bodies(table: Table, machine: Machine) -> dict[str, NDArray]:
     """Return the rigid bodies of a table, without those that it does not know completely."""
-    frame = table.frame[table.frame["effect"] == RigidBody.name]
-    return {
-        kind: frame.loc[frame["run"] == kind, "value"].to_numpy(float)
-        for kind in (*RUNS, "human")
-        if (frame["run"] == kind).sum() == len(machine.mechanism.parameters)
-    }
+    bodies = complete_bodies(table.frame, machine)
+    return {kind: rows["value"].to_numpy(float) for kind, rows in bodies.items()}

@@ -101,6 +101,25 @@ def _term_from_rows(effect: Effect, rows: "pd.DataFrame") -> Term:
         raise InputError(f"the parameters table: {error}") from None
 
 
+def complete_bodies(parameters: "pd.DataFrame", machine: Machine) -> "dict[str, pd.DataFrame]":
+    """Return the rows of each rigid body by its kind of run, of those with every parameter.
+
+    A table lacks parameters that no measured torque determines. The rest of such a body can neither
+    be judged nor simulated.
+
+    Parameters
+    ----------
+    parameters : DataFrame
+        Rows of a ``parameters/1`` table.
+    machine : Machine
+        Its mechanism has the bodies.
+    """
+    bodies = parameters[parameters["effect"] == RigidBody.name]
+    number = len(machine.mechanism.parameters)
+    by_run = bodies.groupby("run", sort=False)
+    return {str(run): rows for run, rows in by_run if len(rows) == number}
+
+
 def unrealizable(parameters: "pd.DataFrame", machine: Machine, geometry: Geometry) -> list[str]:
     """Explain why no real machine has the rigid bodies of a ``parameters/1`` table.
 
@@ -118,12 +137,9 @@ def unrealizable(parameters: "pd.DataFrame", machine: Machine, geometry: Geometr
     list of str
         A reason for each kind of run that is affected; empty if all bodies are realizable.
     """
-    bodies = parameters[parameters["effect"] == RigidBody.name]
     return [
         f"{run}: {reason}"
-        for run, rows in bodies.groupby("run", sort=False)
-        # A body of which a part is not determined cannot be judged.
-        if len(rows) == len(machine.mechanism.parameters)
+        for run, rows in complete_bodies(parameters, machine).items()
         for reason in machine.mechanism.unrealizable(rows["value"].to_numpy(float), geometry)
     ]
 
