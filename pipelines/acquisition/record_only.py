@@ -34,6 +34,8 @@ from pipelines.process.priority import urgent
 from pipelines.settings.acquire import RunSettings
 from pipelines.settings.mechanism import MechanismSettings
 from pipelines.settings.rig.recording_only import RecordingRig, load_recording_rig
+from pipelines.signals.held import are_held, new_values
+from pipelines.signals.sampling import sample_rate
 
 Report = Callable[[float, int], None]
 """Takes the time since the recording began, s, and the number of rows."""
@@ -90,6 +92,30 @@ def record_only(
             text = recorder.why or "the recording is complete"
             kind = DeviceError if recorder.fault is None else ExoidError
             return record_journal(output, lock, kind, text, recorder.fault)
+
+
+def stale_values(path: Path) -> str:
+    """Return a warning of a recording whose device renews its registers less often than rows come.
+
+    Each value is then true at some row before, as in the copy that a gateway keeps. Empty if there
+    is none.
+    """
+    frame = RECORDING.read(path).frame
+    time_s = frame["time_s"].to_numpy()
+    measured = [name for name in map(str, frame) if name.endswith(("_angle_rad", "_torque_nm"))]
+    columns = {name: frame[name].to_numpy() for name in measured}
+    rates = {
+        name: sample_rate(time_s[new_values(values)])
+        for name, values in columns.items()
+        if are_held(values)
+    }
+    if not rates:
+        return ""
+    slow = ", ".join(f"{name} at {rate:.3g} Hz" for name, rate in rates.items())
+    return (
+        f"{path}: new values come slower than rows at {sample_rate(time_s):.3g} Hz: {slow}. Let the"
+        " device or gateway renew its registers faster, or record at that rate"
+    )
 
 
 def _refuse_other_joints(rig: RecordingRig, mechanism: MechanismSettings) -> None:

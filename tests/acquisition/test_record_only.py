@@ -17,7 +17,7 @@ from pipelines.acquisition.check.absent import explain_absence
 from pipelines.acquisition.check.check import check_rig
 from pipelines.acquisition.check.probe import Probe
 from pipelines.acquisition.machine.read_only import ReadOnlyMachine
-from pipelines.acquisition.record_only import record_only
+from pipelines.acquisition.record_only import record_only, stale_values
 from pipelines.contracts import RECORDING
 from pipelines.errors import DeviceError, SettingsError
 from pipelines.settings.acquire import RunSettings
@@ -597,3 +597,23 @@ def test_a_torque_of_magnitude_and_sign_bit_is_recorded_and_has_no_findings(tmp_
             record_only(path, settings, output, 100.0, ELBOW)
     torque = RECORDING.read(output).frame["elbow_torque_nm"]
     assert -20.0 <= torque.min() < -15.0 and 15.0 < torque.max() <= 20.0
+
+
+@pytest.mark.parametrize("every", [1, 10], ids=["each sample", "each tenth sample"])
+def test_registers_that_are_renewed_slower_than_rows_come_are_named(tmp_path, every):
+    def answer(n, words):
+        at = words[0] // every * every / 100.0
+        return [words[0], round(800.0 * np.sin(6.0 * at)) & 0xFFFF, 20]
+
+    server, _ = a_device(answer)
+    path, output = tmp_path / "bench.toml", tmp_path / "bench.parquet"
+    path.write_text(BENCH.format(port=server.getsockname()[1], watchdog_s=1.0))
+    settings = RunSettings(name="one", run="exo_alone", purpose="train", duration_s=2.0)
+    with server:
+        record_only(path, settings, output, 100.0, ELBOW)
+    warning = stale_values(output)
+    assert bool(warning) == (every > 1)
+    if warning:
+        rate = re.search(r"elbow_angle_rad at ([\d.]+) Hz", warning)
+        assert rate is not None and 9.0 < float(rate[1]) < 11.0
+        assert "elbow_torque_nm" not in warning, "it rests"

@@ -218,6 +218,25 @@ def test_hdf5(imported, pendulum, tmp_path):
     assert_is_the_pendulum(imported(path, map_text='[source]\ntable = "run"\n' + below), pendulum)
 
 
+def test_packed_numbers_of_netcdf_are_unpacked_by_their_attributes(imported, pendulum, tmp_path):
+    h5py = pytest.importorskip("h5py")
+    path = tmp_path / "log.nc"
+    with h5py.File(path, "w") as file:
+        for name, values in pendulum.columns().items():
+            file[name] = values
+        del file["torque"]
+        packed = np.round((pendulum.torque - 2.0) / 2e-4).astype(np.int16)
+        packed[5] = -32768
+        file["torque"] = packed
+        attributes = {"scale_factor": 2e-4, "add_offset": 2.0, "_FillValue": np.int16(-32768)}
+        file["torque"].attrs.update(attributes)
+    outcome = imported(path)
+    assert outcome.code == 0
+    assert "torque: unpacked by scale_factor and add_offset of the file" in outcome.printed
+    torque = outcome.recording().frame["pivot_torque_nm"]
+    assert_allclose(torque, np.delete(pendulum.torque, 5), atol=1e-4)
+
+
 BAG_MAP = """
 [time]
 column = "stamp"

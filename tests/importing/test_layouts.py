@@ -411,3 +411,38 @@ def test_a_date_and_one_number_are_a_row(read):
     source, columns = read(["started;2026-01-31", "stamp;torque", *rows])
     assert source.names == ("stamp", "torque")
     assert_allclose(columns["torque"], 0.5 * np.arange(60))
+
+
+def fixed_width(table, is_blank):
+    """Return lines in columns of 12 characters; some rows have no angle."""
+    return ["".join(f"{name:>12}" for name in NAMES)] + [
+        f"{row[0]:>12}{'' if is_blank(n) else row[1]:>12}{row[2]:>12}{row[3]:>12}"
+        for n, row in enumerate(table)
+    ]
+
+
+def test_a_blank_between_spaces_never_moves_the_next_column_into_its_place(read, table):
+    _, columns = read(fixed_width(table, lambda n: n % 7 == 3), "log.txt")
+    short = np.arange(len(table)) % 7 == 3
+    truth = np.array(table, dtype=float).T
+    assert_allclose(columns["time"], truth[0])
+    for name, values in zip(NAMES[1:], truth[1:], strict=True):
+        assert_allclose(columns[name], np.where(short, np.nan, values))
+
+
+def test_blanks_in_most_rows_between_spaces_are_refused(read, table):
+    with pytest.raises(InputError, match="more than the 3 fields"):
+        read(fixed_width(table, lambda n: n % 7 != 3), "log.txt")
+
+
+def test_a_last_column_of_words_may_be_blank_between_spaces(read, table):
+    lines = [" ".join([*row, *["event"] * (n % 3 < 2)]) for n, row in enumerate(table)]
+    _, columns = read([" ".join([*NAMES, "state"]), *lines], "log.txt")
+    assert_same(columns, table)
+
+
+def test_names_with_units_apart_are_not_given_to_the_columns_of_others(read, table):
+    header = "time (s) angle (rad) velocity (rad/s) torque (Nm)"
+    source, _ = read([header, *joined(table, " ")], "log.txt")
+    assert source.names == ("c1", "c2", "c3", "c4")
+    assert "has 8 names, the rows 4 fields" in source.remarks[0]

@@ -37,6 +37,8 @@ class Dialect:
     rows_before: int
     """Lines before the first one of data."""
     names: tuple[str, ...]
+    width: int
+    """Fields of most rows."""
     numeric: frozenset[str]
     """Columns of numbers."""
     heads: tuple[frozenset[str], ...]
@@ -123,6 +125,7 @@ def find_dialect(start: bytes, whole: bool, settings: SourceSettings) -> Dialect
         comment,
         skipped + table.first,
         apart,
+        table.width,
         frozenset(apart[k] for k in table.numeric),
         table.heads(below),
         named.units,
@@ -205,7 +208,10 @@ class _Table:
         counts_rows = all(field.isdigit() for field in counters) and all(
             int(after) == int(before) + 1 for before, after in pairwise(counters)
         )
-        return header(self._above(lines), self.width, counts_rows)
+        # Between spaces no field is blank: a row with fewer fields lacks any one of them.
+        return header(
+            self._above(lines), self.width, counts_rows, may_be_longer=self.delimiter != " "
+        )
 
     def heads(self, lines: Sequence[str]) -> tuple[frozenset[str], ...]:
         """Return the words above each column."""
@@ -309,6 +315,11 @@ def _are_numbers(fields: list[str], decimal: str) -> bool:
     return (numbers >= 2 or dated) and numbers >= enough * sum(
         not _is_missing(field) for field in fields
     )
+
+
+def is_value(field: str, decimal: str) -> bool:
+    """Return whether a field is a number, or a word for one such as nan."""
+    return field != "" and (_is_missing(field) or _is_number(field, decimal))
 
 
 def _is_missing(field: str) -> bool:

@@ -34,6 +34,7 @@ def open_hdf5(path: Path, settings: SourceSettings, format: str = "HDF5") -> Sou
             parts = {data: columns_of(array, data, lengths) for data, array in empty.items()}
             columns = {name: data for data, part in parts.items() for name in part}
             clocks = clocks_of({k: v for part in parts.values() for k, v in part.items()}, "/")
+            packed = [data for data in empty if _packing(group[data]) is not None]
     except OSError as error:
         raise InputError(f"is a damaged or truncated HDF5 file ({error}); copy it again") from error
 
@@ -49,7 +50,21 @@ def open_hdf5(path: Path, settings: SourceSettings, format: str = "HDF5") -> Sou
         return {name: values_of[name] for name in names}
 
     notes = turned({data: array.shape for data, array in empty.items()}, lengths)
-    return Source(path, format, tuple(columns), load, tuple(notes), clocks=clocks)
+    # Printed, since a map that scales such a column by itself would scale it twice.
+    more = f" and {len(packed) - 5} more" if len(packed) > 5 else ""
+    remark = (
+        f"{', '.join(packed[:5])}{more}: unpacked by scale_factor and add_offset of the file; the"
+        " map's scale and zero are of the unpacked values"
+    )
+    return Source(
+        path,
+        format,
+        tuple(columns),
+        load,
+        tuple(notes),
+        clocks=clocks,
+        remarks=(remark,) if packed else (),
+    )
 
 
 def _group(file: Any, table: str | None) -> Any:
@@ -99,4 +114,31 @@ def _values(data: Any, sample: bool = False) -> np.ndarray:
         return data[()].T if not sample else np.empty(data.shape[::-1], dtype=data.dtype)
     # Names follow from shape and type, so a sample needs no values; an empty array costs nothing.
     values = np.empty(data.shape, dtype=data.dtype) if sample else data[()]
-    return np.atleast_1d(values)
+    packing = _packing(data)
+    return np.atleast_1d(values if packing is None else _unpacked(values, data, *packing))
+
+
+def _packing(data: Any) -> tuple[float, float] | None:
+    """Return the factor and the offset of packed numbers, by the CF conventions of netCDF."""
+    factor, offset = (
+        _number(data.attrs.get(name, default))
+        for name, default in (("scale_factor", 1.0), ("add_offset", 0.0))
+    )
+    if factor is None or offset is None or data.dtype.kind not in "iuf":
+        return None
+    return None if (factor, offset) == (1.0, 0.0) else (factor, offset)
+
+
+def _unpacked(values: np.ndarray, data: Any, factor: float, offset: float) -> np.ndarray:
+    """Return numbers as they were before they were packed; NaN where the file has none."""
+    result = values * factor + offset
+    for name in ("_FillValue", "missing_value"):
+        if name in data.attrs:
+            result[np.isin(values, data.attrs[name])] = np.nan
+    return result
+
+
+def _number(value: Any) -> float | None:
+    """Return the one number of an attribute; None if it has none."""
+    array = np.asarray(value)
+    return float(array.reshape(-1)[0]) if array.size == 1 and array.dtype.kind in "iuf" else None

@@ -24,7 +24,9 @@ class Header:
     """How the names follow from lines that do not fit the rows."""
 
 
-def header(above: Sequence[Line], width: int, counts_rows: bool) -> Header:
+def header(
+    above: Sequence[Line], width: int, counts_rows: bool, may_be_longer: bool = True
+) -> Header:
     """Return the names above rows of a width, or numbers where no line fits.
 
     Parameters
@@ -35,6 +37,8 @@ def header(above: Sequence[Line], width: int, counts_rows: bool) -> Header:
         Fields of a row.
     counts_rows : bool
         Whether the first column counts rows by one.
+    may_be_longer : bool
+        Whether names beyond the width belong to columns that are empty in most rows.
     """
     lines = [line for line in above if len(_stripped(line)) > 1]
     by_key = _by_key([line for line in lines if _fits(line, width)])
@@ -45,7 +49,7 @@ def header(above: Sequence[Line], width: int, counts_rows: bool) -> Header:
     last = _stripped(words[-1]) if words else []
     names: tuple[str, ...] = ()
     fitting = [k for k, line in enumerate(words) if _fits(line, width)]
-    if len(last) > width:  # a column more at the end, which is empty in most rows
+    if len(last) > width and may_be_longer:  # a column more at the end, which is empty in most rows
         names = _filled(last)
     elif fitting:
         names = _names([_padded(line, width) for line in words[: fitting[-1] + 1]])

@@ -8,12 +8,16 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
+from numpy.typing import NDArray
 
 from pipelines.errors import InputError
 from pipelines.importing.decimal_marks import as_written
-from pipelines.importing.sources.dialect import Dialect, find_dialect
+from pipelines.importing.sources.dialect import Dialect, find_dialect, is_value
 from pipelines.importing.sources.source import Columns, Source
 from pipelines.settings.import_map import SourceSettings
+
+BEYOND = "\0beyond"
+"""A column after the last, which must be empty."""
 
 
 def open_text(path: Path, settings: SourceSettings) -> Source:
@@ -54,7 +58,7 @@ def _source(path: Path, format: str, dialect: Dialect, content: Callable[[], Any
         path,
         format,
         dialect.names,
-        lambda names: _load(content(), dialect, names),
+        lambda names: _load(content, dialect, names),
         dialect.notes,
         units=dialect.units,
         clocks=dialect.clocks,
@@ -62,37 +66,19 @@ def _source(path: Path, format: str, dialect: Dialect, content: Callable[[], Any
     )
 
 
-def _load(content: Any, dialect: Dialect, names: Sequence[str]) -> Columns:
-    # A column after the last, which must be empty.
-    beyond = "\0beyond"
-    # Rows that are parsed at a time, to keep only the columns that are needed.
-    chunk = 2**17
+def _load(content: Callable[[], Any], dialect: Dialect, names: Sequence[str]) -> Columns:
     parts: list[Columns] = []
     wanted = list(dict.fromkeys(names))
+    ends = list(dialect.names[dialect.width - 1 :])
+    have_short = False
     try:
         # All columns are read, as otherwise pandas would not report rows with too many fields.
-        reader = pd.read_csv(
-            content,
-            sep=dialect.separator,
-            decimal=dialect.decimal,
-            comment=dialect.comment,
-            header=None,
-            names=[*dialect.names, beyond],
-            skiprows=dialect.rows_before,
-            encoding=dialect.encoding,
-            encoding_errors="replace",
-            chunksize=chunk,
-            skipinitialspace=True,
-            # Otherwise pandas takes the first columns for an index where rows have more fields than
-            # names.
-            index_col=False,
-            low_memory=False,
-        )
-        with reader:
+        with _reader(content(), dialect) as reader:
             for part in reader:
-                excess = part[beyond].notna()
+                excess = part[BEYOND].notna()
                 if excess.any():
                     raise InputError(_too_many_fields(f"row {excess.idxmax()}", dialect))
+                have_short |= bool(part[ends].isna().to_numpy().any())
                 part = part[wanted].apply(lambda column: as_written(column, dialect.decimal))
                 _refuse_second_table(part, dialect)
                 # Copies, as slicing one column from a table of thousands is slow later on.
@@ -100,7 +86,92 @@ def _load(content: Any, dialect: Dialect, names: Sequence[str]) -> Columns:
     except (pd.errors.ParserError, ValueError) as error:
         raise InputError(_parse_error(str(error), dialect)) from error
     # Removed from the chunks as they are joined, so that no column is in memory twice for long.
-    return {name: _joined([part.pop(name) for part in parts]) for name in wanted}
+    columns = {name: _joined([part.pop(name) for part in parts]) for name in wanted}
+    if have_short and dialect.delimiter == " ":
+        short, uncertain = _short_rows(content(), dialect, ends)
+        if short.any():
+            for name in uncertain & columns.keys():
+                columns[name] = _blanked(columns[name], short)
+    return columns
+
+
+def _reader(content: Any, dialect: Dialect, **settings: Any) -> Any:
+    """Return a reader of a text's rows, in chunks, of which all columns need not be kept."""
+    # Rows that are parsed at a time.
+    chunk = 2**17
+    return pd.read_csv(
+        content,
+        sep=dialect.separator,
+        decimal=dialect.decimal,
+        comment=dialect.comment,
+        header=None,
+        names=[*dialect.names, BEYOND],
+        skiprows=dialect.rows_before,
+        encoding=dialect.encoding,
+        encoding_errors="replace",
+        chunksize=chunk,
+        skipinitialspace=True,
+        # Otherwise pandas takes the first columns for an index where rows have more fields than
+        # names.
+        index_col=False,
+        low_memory=False,
+        **settings,
+    )
+
+
+def _short_rows(
+    content: Any, dialect: Dialect, ends: Sequence[str]
+) -> tuple[NDArray, frozenset[str]]:
+    """Return which rows end before the last column of numbers, one of ``ends``.
+
+    Such a row lacks a field, which may be any of them: spaces do not show where a blank is.
+
+    Returns
+    -------
+    (n,) array of bool, frozenset of str
+        The rows; and the columns whose values in them are uncertain.
+    """
+    written: list[NDArray] = []
+    numeric: list[NDArray] = []
+    # Columns from the left that are in order in short rows, too, as a clock is: none lacks a field.
+    intact = len(dialect.names)
+    last: dict[str, float] = {}
+    with _reader(content, dialect, dtype=str, keep_default_na=False) as reader:
+        for part in reader:
+            texts = part[ends].fillna("")
+            written.append((texts != "").to_numpy())
+            numeric.append(texts.map(lambda text: is_value(text, dialect.decimal)).to_numpy())
+            for k, name in enumerate(dialect.names[:intact]):
+                if not _in_order(as_written(part[name], dialect.decimal), name, last):
+                    intact = k
+                    break
+    has, counts = np.concatenate(written), np.concatenate(numeric).sum(axis=0)
+    # A last column of words is often blank, and a number missing before it leaves a word there.
+    of_numbers = np.flatnonzero(2 * counts > has.sum(axis=0))
+    short = ~has[:, of_numbers[-1]] if of_numbers.size else np.zeros(len(has), dtype=bool)
+    return short, frozenset(dialect.names[intact:])
+
+
+def _in_order(texts: pd.Series, name: str, last: dict[str, float]) -> bool:
+    """Return whether texts (n,) are dates, or numbers that never decrease from the last before."""
+    date = r"\d{1,4}[-./]\d{1,2}[-./]\d{1,4}|\d{1,4}(:\d{2}){1,2}([.,]\d+)?"
+    if texts.str.fullmatch(date).all():
+        return True
+    values = pd.to_numeric(texts, errors="coerce").to_numpy(dtype=float)
+    before = last.get(name, -np.inf)
+    last[name] = values[-1]
+    return bool((values >= np.append(before, values[:-1])).all())
+
+
+def _blanked(values: NDArray, rows: NDArray) -> NDArray:
+    """Return values (n,) that are missing at some rows (n,)."""
+    # Stamps in nanoseconds since 1970 have more digits than float64.
+    exact = values.dtype.kind == "f" or (
+        values.dtype.kind in "iu" and bool((np.abs(values.astype(float)) < 2.0**53).all())
+    )
+    result = values.astype(float if exact else object)
+    result[rows] = np.nan
+    return result
 
 
 def _refuse_second_table(part: pd.DataFrame, dialect: Dialect) -> None:
