@@ -118,6 +118,37 @@ def stale_values(path: Path) -> str:
     )
 
 
+def saturated_values(path: Path, rig_path: Path) -> str:
+    """Return a warning of a recording with values at the end of their register; empty if none.
+
+    Larger values are cut off there, with the register map right in every respect.
+    """
+    frame, rig = RECORDING.read(path).frame, load_recording_rig(rig_path)
+    counts = {}
+    for joint in rig.drive:
+        for quantity, unit in (("angle", "rad"), ("torque", "nm"), ("current", "a")):
+            register = getattr(rig.map.drive[joint.map].read, quantity, None)
+            column = f"{joint.joint}_{quantity}_{unit}"
+            if register is None or register.turn or column not in frame:
+                continue
+            low, high = register.span
+            # A raw 0 is no end that cuts off, but where an idle value lies.
+            ends = [low, high]
+            if register.is_unsigned:
+                ends = [high if register.scale > 0.0 else low]
+            values = frame[column].to_numpy()
+            at_an_end = sum(np.isclose(values, end, rtol=1e-9) for end in ends if np.isfinite(end))
+            if rows := int(np.count_nonzero(at_an_end)):
+                counts[column] = rows
+    if not counts:
+        return ""
+    found = ", ".join(f"{column} in {rows}" for column, rows in counts.items())
+    return (
+        f"{path}: rows with a value at the end of its register, where larger ones are cut off:"
+        f" {found}. Let the device write coarser units, or two registers"
+    )
+
+
 def _refuse_other_joints(rig: RecordingRig, mechanism: MechanismSettings) -> None:
     """Refuse joints that are not those of the experiment's mechanism, or that slide."""
     recorded, expected = [joint.joint for joint in rig.drive], mechanism.all_joints

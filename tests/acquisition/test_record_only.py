@@ -17,7 +17,7 @@ from pipelines.acquisition.check.absent import explain_absence
 from pipelines.acquisition.check.check import check_rig
 from pipelines.acquisition.check.probe import Probe
 from pipelines.acquisition.machine.read_only import ReadOnlyMachine
-from pipelines.acquisition.record_only import record_only, stale_values
+from pipelines.acquisition.record_only import record_only, saturated_values, stale_values
 from pipelines.contracts import RECORDING
 from pipelines.errors import DeviceError, SettingsError
 from pipelines.settings.acquire import RunSettings
@@ -617,3 +617,18 @@ def test_registers_that_are_renewed_slower_than_rows_come_are_named(tmp_path, ev
         rate = re.search(r"elbow_angle_rad at ([\d.]+) Hz", warning)
         assert rate is not None and 9.0 < float(rate[1]) < 11.0
         assert "elbow_torque_nm" not in warning, "it rests"
+
+
+@pytest.mark.parametrize("largest", [20000.0, 50000.0], ids=["within", "beyond"])
+def test_a_torque_that_is_cut_off_at_the_end_of_its_register_is_named(tmp_path, largest):
+    def answer(n, words):
+        torque = round(largest * np.sin(0.1 * words[0]))
+        return [words[0], 500, min(max(torque, -32768), 32767) & 0xFFFF]
+
+    server, _ = a_device(answer)
+    path, output = tmp_path / "bench.toml", tmp_path / "bench.parquet"
+    path.write_text(BENCH.format(port=server.getsockname()[1], watchdog_s=1.0))
+    settings = RunSettings(name="one", run="exo_alone", purpose="train", duration_s=1.0)
+    with server:
+        record_only(path, settings, output, 100.0, ELBOW)
+    assert ("elbow_torque_nm in " in saturated_values(output, path)) == (largest > 32768.0)
