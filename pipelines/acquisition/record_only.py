@@ -142,10 +142,10 @@ def saturated_values(path: Path, rig_path: Path) -> str:
                 counts[column] = rows
     if not counts:
         return ""
-    found = ", ".join(f"{column} in {rows}" for column, rows in counts.items())
+    rows_of_columns = ", ".join(f"{column} in {rows}" for column, rows in counts.items())
     return (
         f"{path}: rows with a value at the end of its register, where larger ones are cut off:"
-        f" {found}. Let the device write coarser units, or two registers"
+        f" {rows_of_columns}. Let the device write coarser units, or two registers"
     )
 
 
