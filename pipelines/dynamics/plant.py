@@ -55,19 +55,18 @@ def make_plant(model: Model, geometry: Geometry, joints: tuple[Joint, ...], run:
     InputError
         If no real machine has its parameters, or a torque was not measured.
     """
-    if not all(joint.is_measured for joint in joints):
-        machine_of(joints, geometry).refuse_unmeasured("the model", "A simulation")
+    machine = machine_of(joints, geometry)
+    machine.refuse_unmeasured("the model", "A simulation")
     model = model.for_run(run)
     assembly = assemble(model, geometry, [joint.name for joint in joints])
     lightest = _lightest(assembly)
     if lightest <= 0:
         X = sum(term.values for term in model if isinstance(term.effect, RigidBody))
-        mechanism = machine_of(joints, geometry).mechanism
-        reasons = mechanism.unrealizable(X, geometry) or [
+        reasons = machine.mechanism.unrealizable(X, geometry) or [
             f"the mass matrix has the eigenvalue {lightest:.3g} kg·m²"
         ]
         whose, remedy = "leg", "from motions that separate X1, X2 and X3 better"
-        if mechanism is not LEG:
+        if machine.mechanism is not LEG:
             whose = "machine"
             remedy = "from richer motions, with the signs of torque and angle as they should be"
         raise InputError(

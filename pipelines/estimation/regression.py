@@ -206,8 +206,22 @@ def at_rest(motion: Motion) -> NDArray:
     (J,) bool array
         False at a measured joint, which must move.
     """
-    moves = np.any(away_from_reversals(motion) & motion.valid[:, np.newaxis], axis=0)
-    return np.asarray(~moves & ~motion.machine.measured)
+    return ~moves(motion) & ~motion.machine.measured
+
+
+def moves(motion: Motion) -> NDArray:
+    """Return whether each joint moves away from reversals at some valid sample.
+
+    Parameters
+    ----------
+    motion : Motion
+        n samples of J joints.
+
+    Returns
+    -------
+    (J,) bool array
+    """
+    return np.any(away_from_reversals(motion) & motion.valid[:, np.newaxis], axis=0)
 
 
 def turns(motion: Motion) -> NDArray:

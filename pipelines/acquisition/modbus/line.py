@@ -295,6 +295,7 @@ class Line:
             self._ended_by = error
             hand_on(error)
 
+        # pymodbus has no hook for it, so its own method is replaced.
         self.client.ctx.callback_disconnected = note  # type: ignore[assignment, method-assign]
 
     def _note_connection(self, connected: bool) -> None:

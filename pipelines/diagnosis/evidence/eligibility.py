@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from pipelines.contracts.joints import the
 from pipelines.errors import InputError
-from pipelines.estimation.regression import away_from_reversals, reversal_speeds
+from pipelines.estimation.regression import away_from_reversals, moves, reversal_speeds
 from pipelines.mechanics.constant_torque import constant_torque
 from pipelines.mechanics.motion import Motion
 from pipelines.mechanics.remedies import AT_REST, settings_of
@@ -173,15 +173,11 @@ def _simpler(motions: Sequence[Motion], joint: int, session: Sequence[Motion]) -
     if len(motions[0].joints) < 2:
         return ""
     others = (m for m in session if not any(m is one for one in motions))
-    moves_in = next((m.file for m in others if _moves(m, joint)), None)
+    moves_in = next((m.file for m in others if moves(m)[joint]), None)
     if moves_in is None:
         return f"; {AT_REST}"
     purpose = "train" if motions[0].purpose == "train" else "validate"
     return f", or {purpose} on a run in which it moves, as in {moves_in}"
-
-
-def _moves(motion: Motion, joint: int) -> bool:
-    return bool((away_from_reversals(motion)[:, joint] & motion.valid).any())
 
 
 def _seconds(motions: Sequence[Motion], marked: Sequence[NDArray]) -> float:

@@ -117,8 +117,7 @@ def with_slowest(
 
 
 def _moves(values: NDArray) -> bool:
-    known = _distinct(values)
-    return len(known) > 1
+    return len(_distinct(values)) > 1
 
 
 def _distinct(values: NDArray) -> NDArray:
