@@ -102,7 +102,7 @@ def acquire(
 
 def _record_only(experiment: "Experiment", run: str, output: Path, overwrite: bool) -> None:
     """Record a machine that its own controller moves."""
-    from pipelines.acquisition.record_only import record_only, saturated_values, stale_values
+    from pipelines.acquisition.record_only import misread_values, record_only
     from pipelines.workflow.imported import refuse_imported, refuse_recorded
 
     def claim() -> None:
@@ -127,9 +127,8 @@ def _record_only(experiment: "Experiment", run: str, output: Path, overwrite: bo
             report,
             claim,
         )
-    for warning in (stale_values(outcome.path), saturated_values(outcome.path, rig)):
-        if warning:
-            console.warn(warning)
+    for warning in misread_values(outcome.path, rig):
+        console.warn(warning)
     _say_outcome(outcome, run)
 
 

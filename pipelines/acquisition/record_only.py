@@ -17,6 +17,7 @@ import numpy as np
 from pipelines.acquisition.machine.read_only import ReadOnlyMachine, ReadOnlyRow
 from pipelines.acquisition.machine.torn_words import TornRows
 from pipelines.acquisition.machine.turns import LastingLeap
+from pipelines.acquisition.misread import held, misread
 from pipelines.acquisition.modbus.exclusive_access import exclusive_access
 from pipelines.acquisition.modbus.file_lock import locked
 from pipelines.acquisition.pacing import LEAN
@@ -34,8 +35,6 @@ from pipelines.process.priority import urgent
 from pipelines.settings.acquire import RunSettings
 from pipelines.settings.mechanism import MechanismSettings
 from pipelines.settings.rig.recording_only import RecordingRig, load_recording_rig
-from pipelines.signals.held import are_held, new_values
-from pipelines.signals.sampling import sample_rate
 
 Report = Callable[[float, int], None]
 """Takes the time since the recording began, s, and the number of rows."""
@@ -94,59 +93,22 @@ def record_only(
             return record_journal(output, lock, kind, text, recorder.fault)
 
 
-def stale_values(path: Path) -> str:
-    """Return a warning of a recording whose device renews its registers less often than rows come.
-
-    Each value is then true at some row before, as in the copy that a gateway keeps. Empty if there
-    is none.
-    """
-    frame = RECORDING.read(path).frame
-    time_s = frame["time_s"].to_numpy()
-    measured = [name for name in map(str, frame) if name.endswith(("_angle_rad", "_torque_nm"))]
-    columns = {name: frame[name].to_numpy() for name in measured}
-    rates = {
-        name: sample_rate(time_s[new_values(values)])
-        for name, values in columns.items()
-        if are_held(values)
-    }
-    if not rates:
-        return ""
-    slow = ", ".join(f"{name} at {rate:.3g} Hz" for name, rate in rates.items())
-    return (
-        f"{path}: new values come slower than rows at {sample_rate(time_s):.3g} Hz: {slow}. Let the"
-        " device or gateway renew its registers faster, or record at that rate"
-    )
-
-
-def saturated_values(path: Path, rig_path: Path) -> str:
-    """Return a warning of a recording with values at the end of their register; empty if none.
-
-    Larger values are cut off there, with the register map right in every respect.
-    """
+def misread_values(path: Path, rig_path: Path) -> list[str]:
+    """Return warnings of a recording's values that are possible one by one, but not in a row."""
     frame, rig = RECORDING.read(path).frame, load_recording_rig(rig_path)
-    counts = {}
+    time_s = frame["time_s"].to_numpy()
+    channels: dict[str, list[str]] = {}
     for joint in rig.drive:
         for quantity, unit in (("angle", "rad"), ("torque", "nm"), ("current", "a")):
             register = getattr(rig.map.drive[joint.map].read, quantity, None)
-            column = f"{joint.joint}_{quantity}_{unit}"
-            if register is None or register.turn or column not in frame:
+            if register is None:
                 continue
-            low, high = register.span
-            # A raw 0 is no end that cuts off, but where an idle value lies.
-            ends = [low, high]
-            if register.is_unsigned:
-                ends = [high if register.scale > 0.0 else low]
+            column, where = f"{joint.joint}_{quantity}_{unit}", f"map.drive.{joint.map}.read"
             values = frame[column].to_numpy()
-            at_an_end = sum(np.isclose(values, end, rtol=1e-9) for end in ends if np.isfinite(end))
-            if rows := int(np.count_nonzero(at_an_end)):
-                counts[column] = rows
-    if not counts:
-        return ""
-    rows_of_columns = ", ".join(f"{column} in {rows}" for column, rows in counts.items())
-    return (
-        f"{path}: rows with a value at the end of its register, where larger ones are cut off:"
-        f" {rows_of_columns}. Let the device write coarser units, or two registers"
-    )
+            texts = misread(quantity, register, f"{where}.{quantity}", values)
+            for text in (*texts, *held(time_s, values)):
+                channels.setdefault(text, []).append(column)
+    return [f"{path}: {', '.join(columns)}: {text}" for text, columns in channels.items()]
 
 
 def _refuse_other_joints(rig: RecordingRig, mechanism: MechanismSettings) -> None:

@@ -4,6 +4,7 @@ import struct
 from collections.abc import Mapping, Sequence
 from operator import itemgetter
 
+from pipelines.modbus.counts import count_of, raw_of
 from pipelines.settings.rig import Register
 from pipelines.settings.rig.register import STRUCT_CODES
 
@@ -17,8 +18,9 @@ class Block:
     def __init__(self, registers: Mapping[str, Register]) -> None:
         self.registers = dict(registers)
         self.names = tuple(registers)
-        self.address = min(r.address for r in registers.values())
-        self.count = max(r.address + r.registers for r in registers.values()) - self.address
+        spans = [span for r in registers.values() for span in r.spans]
+        self.address = min(span.start for span in spans)
+        self.count = max(span.stop for span in spans) - self.address
         # Bytes are picked in the order of one big-endian structure of all values.
         self._places = [place for r in registers.values() for place in self._bytes(r)]
         self._pick = itemgetter(*self._places)
@@ -27,8 +29,18 @@ class Block:
             ">" + "".join(STRUCT_CODES[r.type] for r in registers.values())
         )
         self._scales = [r.si for r in registers.values()]
-        self._sign_bits = [r.sign_bit for r in registers.values()]
         self._ranges = [r.counts for r in registers.values()]
+        # Few registers are encoded: the others must cost nothing in the loop of a run.
+        self._encoded = [
+            (k, name, r)
+            for k, (name, r) in enumerate(registers.items())
+            if r.encoding != "binary" or r.sign_bit is not None
+        ]
+        self._directions = [
+            (name, r.direction, r.direction.address - self.address)
+            for name, r in registers.items()
+            if r.direction is not None
+        ]
 
     def _bytes(self, register: Register) -> list[int]:
         first = register.address - self.address
@@ -46,15 +58,21 @@ class Block:
         Returns
         -------
         dict
-            SI value by quantity.
+            SI value by quantity; NaN where its digits are not decimal.
         """
         raw = self._values_format.unpack(bytes(self._pick(self._words_format.pack(*words))))
-        return {
-            name: (value if bit is None else _signed(value, bit)) * scale + offset
-            for name, value, bit, (scale, offset) in zip(
-                self.names, raw, self._sign_bits, self._scales, strict=True
-            )
+        values = {
+            name: value * scale + offset
+            for name, value, (scale, offset) in zip(self.names, raw, self._scales, strict=True)
         }
+        for k, name, register in self._encoded:
+            scale, offset = self._scales[k]
+            values[name] = count_of(register, raw[k]) * scale + offset
+        for name, direction, place in self._directions:
+            if words[place] & direction.mask == direction.negative:
+                offset = self.registers[name].si[1]
+                values[name] = 2.0 * offset - values[name]
+        return values
 
     def encode(self, values: Mapping[str, float]) -> list[int]:
         """Return the words of a block; values beyond a register's range saturate.
@@ -70,19 +88,27 @@ class Block:
             ``count`` words.
         """
         raw = []
-        for name, bit, (scale, offset), limits in zip(
-            self.names, self._sign_bits, self._scales, self._ranges, strict=True
+        for name, (scale, offset), limits in zip(
+            self.names, self._scales, self._ranges, strict=True
         ):
             # A count beyond the range would raise an error in `struct`, so it saturates. A float is
             # not rounded.
             value = (values[name] - offset) / scale
             count = value if limits is None else min(max(round(value), limits[0]), limits[1])
-            raw.append(2**bit - count if bit is not None and count < 0 else count)
+            raw.append(count if self.registers[name].direction is None else abs(count))
+        for k, _, register in self._encoded:
+            raw[k] = raw_of(register, int(raw[k]))
         # Registers without a name are written as 0; a drive's block has none (`DriveMap`).
         packed = bytearray(2 * self.count)
         for place, byte in zip(self._places, self._values_format.pack(*raw), strict=True):
             packed[place] = byte
-        return list(self._words_format.unpack(packed))
+        words = list(self._words_format.unpack(packed))
+        for name, direction, place in self._directions:
+            scale, offset = self.registers[name].si
+            positive = 0 if direction.negative else direction.mask
+            sign = direction.negative if (values[name] - offset) / scale < 0.0 else positive
+            words[place] = words[place] & ~direction.mask | sign
+        return words
 
     def only(self, name: str) -> "Block":
         """Return the block of one quantity."""
@@ -105,8 +131,3 @@ class Block:
         register = self.registers[name]
         limits = register.counts
         return (limits[1] + 1) * register.si[0] if limits and limits[0] == 0 else 0.0
-
-
-def _signed(raw: int, bit: int) -> int:
-    """Return the count of a register that holds a magnitude, and a bit that is set below zero."""
-    return raw if raw < 2**bit else 2**bit - raw

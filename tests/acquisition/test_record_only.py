@@ -9,20 +9,23 @@ import socket
 import struct
 import threading
 import time
+import tomllib
 
 import numpy as np
 import pytest
 
+from pipelines.acquisition.check import survey
 from pipelines.acquisition.check.absent import explain_absence
 from pipelines.acquisition.check.check import check_rig
 from pipelines.acquisition.check.probe import Probe
 from pipelines.acquisition.machine.read_only import ReadOnlyMachine
-from pipelines.acquisition.record_only import record_only, saturated_values, stale_values
+from pipelines.acquisition.record_only import misread_values, record_only
 from pipelines.contracts import RECORDING
 from pipelines.errors import DeviceError, SettingsError
+from pipelines.modbus.register_block import Block
 from pipelines.settings.acquire import RunSettings
 from pipelines.settings.mechanism import MechanismSettings
-from pipelines.settings.rig import load_rig
+from pipelines.settings.rig import Register, load_rig
 from pipelines.settings.rig.recording_only import load_recording_rig
 from tests.acquisition.conftest import free_port
 
@@ -55,6 +58,12 @@ sequence = { address = 100, type = "uint32" }
 time = { address = 102, type = "uint32", unit = "us" }
 """
 REAL = {"[plant]\n": "[plant]\nsample_rate_hz = 40.0\n"}
+
+
+@pytest.fixture(autouse=True)
+def short_check(monkeypatch):
+    """These machines move fast enough to be judged within half the time."""
+    monkeypatch.setattr(survey, "ALONE_S", 1.0)
 
 
 @pytest.fixture
@@ -599,7 +608,7 @@ def test_a_torque_of_magnitude_and_sign_bit_is_recorded_and_has_no_findings(tmp_
     assert -20.0 <= torque.min() < -15.0 and 15.0 < torque.max() <= 20.0
 
 
-@pytest.mark.parametrize("every", [1, 10], ids=["each sample", "each tenth sample"])
+@pytest.mark.parametrize("every", [1, 5], ids=["each sample", "each fifth sample"])
 def test_registers_that_are_renewed_slower_than_rows_come_are_named(tmp_path, every):
     def answer(n, words):
         at = words[0] // every * every / 100.0
@@ -608,15 +617,16 @@ def test_registers_that_are_renewed_slower_than_rows_come_are_named(tmp_path, ev
     server, _ = a_device(answer)
     path, output = tmp_path / "bench.toml", tmp_path / "bench.parquet"
     path.write_text(BENCH.format(port=server.getsockname()[1], watchdog_s=1.0))
-    settings = RunSettings(name="one", run="exo_alone", purpose="train", duration_s=2.0)
+    settings = RunSettings(name="one", run="exo_alone", purpose="train", duration_s=1.2)
     with server:
         record_only(path, settings, output, 100.0, ELBOW)
-    warning = stale_values(output)
-    assert bool(warning) == (every > 1)
-    if warning:
-        rate = re.search(r"elbow_angle_rad at ([\d.]+) Hz", warning)
-        assert rate is not None and 9.0 < float(rate[1]) < 11.0
-        assert "elbow_torque_nm" not in warning, "it rests"
+        (texts, findings) = misread_values(output, path), findings_of(path, server)
+    assert len(texts) == len(findings) == (every > 1), "the torque rests"
+    for text, start in zip(
+        (*texts, *findings), (f"{output}: elbow_angle_rad", "angle"), strict=False
+    ):
+        rate = re.match(re.escape(start) + r": new values come at ([\d.]+) Hz, and rows at", text)
+        assert rate is not None and 18.0 < float(rate[1]) < 22.0
 
 
 @pytest.mark.parametrize("largest", [20000.0, 50000.0], ids=["within", "beyond"])
@@ -631,4 +641,56 @@ def test_a_torque_that_is_cut_off_at_the_end_of_its_register_is_named(tmp_path, 
     settings = RunSettings(name="one", run="exo_alone", purpose="train", duration_s=1.0)
     with server:
         record_only(path, settings, output, 100.0, ELBOW)
-    assert ("elbow_torque_nm in " in saturated_values(output, path)) == (largest > 32768.0)
+        (texts, findings) = misread_values(output, path), findings_of(path, server)
+    assert len(texts) == len(findings) == (largest > 32768.0)
+    for text, name in zip((*texts, *findings), ("elbow_torque_nm", "torque"), strict=False):
+        assert re.search(rf"{name}: \d+ of \d+ values are at the end of their register", text)
+
+
+ENCODED = {
+    "mod10": ('type = "uint32", encoding = "mod10"', 'type = "uint32"'),
+    "mod10, a sign each word": ('type = "int32", encoding = "mod10"', 'type = "int32"'),
+    "bcd": ('type = "uint32", encoding = "bcd", sign_bit = 31', 'type = "int32"'),
+    "direction": ('type = "uint32", direction = { address = 4, negative = 1 }', 'type = "uint32"'),
+}
+"""Keys of a torque as a device encodes it, and as a hurried user writes them."""
+NAMED = {
+    "mod10": 'encoding = "mod10"',
+    "mod10, a sign each word": 'encoding = "mod10"',
+    "bcd": 'encoding = "bcd" and type = "uint32" and sign_bit = 31',
+    "direction": "direction to the register that has it, or sign_bit",
+}
+"""What the check says then."""
+
+
+@pytest.mark.parametrize("encoded", ENCODED)
+def test_an_encoding_is_recorded_as_the_file_says_and_named_where_it_does_not(tmp_path, encoded):
+    right, wrong = (f'address = 2, {keys}, unit = "N·m"' for keys in ENCODED[encoded])
+    device = Block({"torque": Register.model_validate(tomllib.loads(f"x = {{ {right} }}")["x"])})
+    middle = 25000.0 if encoded == "mod10" else 0.0
+
+    def answer(n, words):
+        torque = middle + 24000.0 * np.sin(0.15 * words[0])
+        return [words[0], 500, *device.encode({"torque": torque}), 0, 0][:5]
+
+    was = 'address = 2, type = "int16", scale = 0.1, unit = "N·m"'
+    assert was in BENCH
+    settings = RunSettings(name="one", run="exo_alone", purpose="train", duration_s=1.2)
+    for keys in (right, wrong):
+        server, _ = a_device(answer)
+        path, output = tmp_path / "bench.toml", tmp_path / f"{keys == right}.parquet"
+        text = BENCH.format(port=server.getsockname()[1], watchdog_s=1.0)
+        path.write_text(text.replace(was, keys))
+        with server:
+            record_only(path, settings, output, 100.0, ELBOW)
+            texts = misread_values(output, path) + findings_of(path, server)
+        if keys == wrong:
+            assert len(texts) == 2
+            assert all(f"set map.drive.plc.read.torque.{NAMED[encoded]}" in text for text in texts)
+            continue
+        assert texts == []
+        frame = RECORDING.read(output).frame
+        # The rows' numbers begin with that of the device at the first row.
+        phases = 0.15 * (frame["sequence"].to_numpy() + np.arange(10**4)[:, None])
+        wrong_nm = middle + 24000.0 * np.sin(phases) - frame["elbow_torque_nm"].to_numpy()
+        assert np.abs(wrong_nm).max(axis=1).min() <= 1.0

@@ -1,3 +1,5 @@
+import re
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -75,12 +77,24 @@ def test_words_and_bytes_can_come_in_any_order(word_order, byte_order, words):
     assert block.encode({"x": float(0x0A0B0C0D)}) == words
 
 
-def raws(kind):
+def raws(register):
     """Return every value that a register can hold."""
-    if kind.startswith("float"):
-        return st.floats(allow_nan=False, allow_infinity=False, width=int(kind[5:]))
-    low, high = Register(address=0, type=kind).counts
-    return st.integers(low, high)
+    if register.type.startswith("float"):
+        width = int(register.type[5:])
+        return st.floats(allow_nan=False, allow_infinity=False, width=width)
+    return st.integers(*register.counts)
+
+
+@st.composite
+def encodings(draw, kind, address):
+    """Return keys of an encoding that a type may have."""
+    bits = int(kind.removeprefix("uint")) if kind.startswith("uint") else 0
+    keys = draw(st.sampled_from([{}] if kind.startswith("float") else [{}, {"encoding": "mod10"}]))
+    if not bits:
+        return keys
+    keys = draw(st.sampled_from([keys, {"encoding": "bcd"}]))
+    direction = {"address": address, "mask": 6, "negative": draw(st.sampled_from([0, 2, 6]))}
+    return keys | draw(st.sampled_from([{}, {"sign_bit": bits - 1}, {"direction": direction}]))
 
 
 @st.composite
@@ -95,11 +109,13 @@ def blocks(draw):
             key: draw(st.sampled_from(["big", "little"])) for key in ("word_order", "byte_order")
         }
         address += draw(st.integers(0, 3))
-        registers[f"v{i}"] = Register(address=address, type=kind, **orders)
-        address += REGISTERS[kind]
+        after = address + REGISTERS[kind]
+        keys = draw(encodings(kind, after))
+        registers[f"v{i}"] = Register(address=address, type=kind, **orders, **keys)
+        address = after + ("direction" in keys)
     names = draw(st.permutations(list(registers)))
     return {name: registers[name] for name in names}, {
-        name: draw(raws(registers[name].type)) for name in names
+        name: draw(raws(registers[name])) for name in names
     }
 
 
@@ -121,11 +137,10 @@ def test_a_value_is_where_its_register_is_and_nowhere_else(drawn, data):
     block, name = Block(registers), data.draw(st.sampled_from(list(registers)))
     before, after = (
         block.encode(values),
-        block.encode({**values, name: data.draw(raws(registers[name].type))}),
+        block.encode({**values, name: data.draw(raws(registers[name]))}),
     )
-    first = registers[name].address - block.address
-    changed = {place for place in range(block.count) if before[place] != after[place]}
-    assert changed <= set(range(first, first + registers[name].registers))
+    own = {at - block.address for span in registers[name].spans for at in span}
+    assert {place for place in range(block.count) if before[place] != after[place]} <= own
 
 
 @patient
@@ -197,6 +212,73 @@ def test_a_magnitude_with_a_sign_bit_is_read_and_written():
 def test_a_sign_bit_outside_of_an_unsigned_type_is_refused(kind, bit):
     with pytest.raises(ValueError, match="expected a bit of an unsigned type"):
         Register(address=0, type=kind, sign_bit=bit)
+
+
+@pytest.mark.parametrize(
+    ("keys", "words", "count"),
+    [
+        ({"type": "uint32", "encoding": "mod10"}, [3, 4567], 34567),
+        ({"type": "uint32", "encoding": "mod10", "sign_bit": 31}, [0x8003, 4567], -34567),
+        # A sign in each word, as of meters of electric power.
+        ({"type": "int32", "encoding": "mod10"}, [0xFFFD, 65536 - 4567], -34567),
+        ({"type": "int32", "encoding": "mod10"}, [0, 65536 - 4567], -4567),
+        ({"type": "uint16", "encoding": "bcd"}, [0x1234], 1234),
+        ({"type": "uint16", "encoding": "bcd", "sign_bit": 15}, [0x8234], -234),
+        ({"type": "uint32", "encoding": "bcd"}, [0x1234, 0x5678], 12345678),
+    ],
+)
+def test_decimal_digits_mean_what_makers_of_devices_say(keys, words, count):
+    block = Block({"x": Register(address=5, **keys)})
+    assert block.decode(words) == {"x": count}
+    assert block.encode({"x": count}) == words
+
+
+def test_a_sign_of_four_bits_is_read_too():
+    block = Block({"x": Register(address=0, type="uint16", encoding="bcd", sign_bit=15)})
+    assert block.decode([0xF234]) == {"x": -234.0}
+
+
+@pytest.mark.parametrize(
+    ("keys", "words"),
+    [
+        ({"type": "uint16", "encoding": "bcd"}, [0x12A4]),
+        ({"type": "uint16", "encoding": "bcd", "sign_bit": 15}, [0x9234]),
+        ({"type": "uint32", "encoding": "mod10"}, [0, 10000]),
+        ({"type": "int32", "encoding": "mod10"}, [0, 65536 - 10000]),
+    ],
+)
+def test_a_digit_that_is_not_decimal_makes_no_number(keys, words):
+    assert np.isnan(Block({"x": Register(address=0, **keys)}).decode(words)["x"])
+
+
+def test_a_direction_in_another_register_is_the_sign_of_a_magnitude():
+    direction = {"address": 3, "mask": 4, "negative": 4}
+    register = Register(address=7, type="uint16", scale=0.1, offset=2.0, direction=direction)
+    block = Block({"x": register})
+    assert block.decode([0, 0, 0, 0, 50])["x"] == pytest.approx(7.0)
+    assert block.decode([0xFFFF, 0, 0, 0, 50])["x"] == pytest.approx(-3.0)
+    assert block.encode({"x": -3.0}) == [4, 0, 0, 0, 50]
+    assert register.span == pytest.approx((2.0 - 6553.5, 2.0 + 6553.5))
+
+
+@pytest.mark.parametrize(
+    ("keys", "message"),
+    [
+        ({"type": "int16", "encoding": "bcd"}, "encoding: found bcd with type int16"),
+        ({"type": "float32", "encoding": "mod10"}, "expected an integer"),
+        ({"type": "uint16", "encoding": "bcd", "sign_bit": 11}, "expected 12 or more with bcd"),
+        ({"type": "uint32", "encoding": "mod10", "sign_bit": 15}, "expected 31 or more with mod10"),
+        ({"type": "int16", "direction": {"address": 9, "negative": 1}}, "a sign of its own"),
+        ({"type": "uint16", "direction": {"address": 0, "negative": 1}}, "of the value itself"),
+        (
+            {"type": "uint16", "direction": {"address": 9, "mask": 2, "negative": 1}},
+            "negative: found 0x0001, expected bits of mask 0x0002 only",
+        ),
+    ],
+)
+def test_encodings_that_no_register_has_are_refused(keys, message):
+    with pytest.raises(ValidationError, match=re.escape(message)):
+        Register(address=0, **keys)
 
 
 def test_units_become_si():

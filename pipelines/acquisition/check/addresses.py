@@ -79,11 +79,14 @@ def _distances(probe: Probe) -> list[int]:
 def _moved(
     probe: Probe, settings: ReadBlock, by: int, names: tuple[str, ...]
 ) -> Iterator[MovedBlock]:
-    changed = {
-        name: {**register.model_dump(), "address": register.address + by}
+    changed: dict[str, dict] = {
+        name: register.model_dump()
         for name, register in registers_of(settings).items()
         if name in names
     }
+    for register in changed.values():
+        for place in filter(None, (register, register["direction"])):
+            place["address"] += by
     try:
         # Validated again: an address may now be impossible.
         read = type(settings).model_validate(settings.model_dump(exclude_none=True) | changed)

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from pipelines.acquisition.check.probe import Series
 from pipelines.modbus.register_block import Block
 from pipelines.settings.rig import Register
-from pipelines.settings.rig.register import DIMENSION, REGISTERS, RegisterType
+from pipelines.settings.rig.register import DIGITS, DIMENSION, REGISTERS, RegisterType
 
 # Many manuals do not name the order of words, so a wrong one is likelier than a wrong type.
 _COST = {"word_order": 1, "type": 2}
@@ -33,13 +33,14 @@ def _interpretations(name: str, block: Block) -> Iterator[Interpretation]:
     was = block.registers[name]
     others = (register for other, register in block.registers.items() if other != name)
     taken = {address for register in others for address in register.addresses}
+    is_encoded = bool(was.sign_bit or was.direction or was.encoding != "binary")
     for kind, order, swapped in product(get_args(RegisterType), ("big", "little"), (False, True)):
         # A longer type must not reach into another register, or beyond what was read.
         end = was.address + REGISTERS[kind]
         if end > block.address + block.count or taken & set(range(was.address, end)):
             continue
-        # Other types hold no magnitude with a sign bit.
-        if was.sign_bit is not None and kind != was.type:
+        # Other types may hold no sign bit, direction or digits.
+        if is_encoded and kind != was.type:
             continue
         # A single word has no order.
         if REGISTERS[kind] == 1 and order != was.word_order:
@@ -58,6 +59,11 @@ def _interpretations(name: str, block: Block) -> Iterator[Interpretation]:
             update["scale"] = 1.0  # a float is in its unit, not in counts
         register = was.model_copy(update=update)
         yield Interpretation(register, swapped, _written(update, swapped), cost)
+    is_binary = was.counts is not None and not is_encoded and name not in ("sequence", "time")
+    for encoding in DIGITS if is_binary else ():
+        kind = was.type if encoding == "mod10" else f"uint{16 * was.registers}"
+        update = {"encoding": encoding} | ({"type": kind} if kind != was.type else {})
+        yield Interpretation(was.model_copy(update=update), False, _written(update, False), 3)
     for unit in DIMENSION[name]:
         if unit != was.unit:
             register = was.model_copy(update={"unit": unit})

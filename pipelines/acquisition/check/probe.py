@@ -93,7 +93,7 @@ class Series:
         """
         register = register or self.block.registers[name]
         one = Block({name: register})
-        start = register.address - self.block.address
+        start = one.address - self.block.address
         words = self.words[:, start : start + one.count]
         if bytes_swapped:
             words = (words >> 8) | ((words & 0xFF) << 8)

@@ -22,6 +22,7 @@ from pipelines.acquisition.check.probe import Probe, Series
 from pipelines.acquisition.check.rate import Rate, check_rate, cycles
 from pipelines.acquisition.check.refusals import explain_refusal, lacks_exchange
 from pipelines.acquisition.check.rings import check_rings
+from pipelines.acquisition.check.values import check_values
 from pipelines.acquisition.check.velocity import check_velocity, shows_velocity
 from pipelines.acquisition.check.zeros import check_zeros
 from pipelines.acquisition.machine.drive import Drive
@@ -38,6 +39,8 @@ from pipelines.settings.rig import RigSettings
 from pipelines.settings.rig.recording_only import RecordingRig
 
 Rig = RigSettings | RecordingRig
+ALONE_S = 2.0
+"""Longest time in which each device is read alone; one of a machine that moves takes all of it."""
 TOGETHER_S = 2.0
 DRIVES_S = 1.0
 """Durations of cycles with all devices, and with the drives alone."""
@@ -188,6 +191,7 @@ def _check_read_only(
     series = probe.take()
     report.latency = Latency.of(series.answered - series.asked)
     findings = list(check_registers(probe, series, rig))
+    findings += check_values(probe, series, rate_hz)
     if "sequence" in series.block.names:
         seconds = float(series.answered[-1] - series.answered[0])
         report.clock = measure_clock(probe, series, seconds)
@@ -225,9 +229,8 @@ async def _connect(probes: Sequence[Probe]) -> dict[Line, DeviceError]:
 
 async def _measure_device(probe: Probe, report: DeviceReport, earlier: Sequence[Probe]) -> None:
     """Read a device's identity, then its block many times."""
-    # Readings of each device alone, and their longest duration; a shorter one shows no clock.
-    reads, reads_s = 200, 2.0
-    least_s = 1.0 if isinstance(probe.part, ReadOnlyPart) else 0.0
+    reads = 200  # are enough where nothing moves
+    least_s = ALONE_S if isinstance(probe.part, ReadOnlyPart) else 0.0
     # A moving leg tolerates a lost answer only; where nothing moves, any fault costs a row.
     bearable = DeviceError if isinstance(probe.part, ReadOnlyPart) else Unanswered
     device, loop = probe.part.device, asyncio.get_running_loop()
@@ -244,7 +247,7 @@ async def _measure_device(probe: Probe, report: DeviceReport, earlier: Sequence[
     await device.check_identity(identity, read.function)
     await probe.read()
     began, count, faults = loop.time(), 1, list[DeviceError]()
-    while loop.time() < began + (reads_s if count < reads else least_s):
+    while loop.time() < began + (ALONE_S if count < reads else least_s):
         count += 1
         try:
             await probe.read()

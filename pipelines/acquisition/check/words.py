@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from pipelines.acquisition.check.finding import Finding
 from pipelines.acquisition.check.probe import Probe, Series
-from pipelines.acquisition.machine.torn_words import NEAR, WORD, is_leap
+from pipelines.acquisition.machine.torn_words import NEAR, is_leap
 from pipelines.settings.rig import Register
 
 
@@ -42,10 +42,10 @@ def check_words(probe: Probe, series: Series, *, order: bool) -> Iterator[Findin
                 name,
                 is_explained=True,
             )
-        elif _is_torn(steps):
+        elif _is_torn(steps / register.word):
             yield probe.finding(
-                f"{name} leaps by {WORD} counts and back: its words are of two instants; read a"
-                f" value that the device latches, or one of a single register, as {where}",
+                f"{name} leaps by {register.word} counts and back: its words are of two instants;"
+                f" read a value that the device latches, or one of a single register, as {where}",
                 name,
             )
 
@@ -66,7 +66,7 @@ def _is_turned(series: Series, name: str, sizes: NDArray, sizes_turned: NDArray)
 
 
 def _is_torn(steps: NDArray) -> bool:
-    """Return whether changes (n,) hold a leap of a high word that is taken back at once."""
+    """Return whether changes (n,), in high words, hold a leap of one that is taken back at once."""
     leaps = np.array([is_leap(step) for step in steps], dtype=bool)
     back = leaps[:-1] & leaps[1:] & (steps[:-1] * steps[1:] < 0.0)
     return bool(back.any() and (np.abs(steps[~leaps]) <= NEAR).all())

@@ -174,12 +174,12 @@ class ReadOnlyMachine:
         ]
 
     def long_integers(self) -> dict[int, float]:
-        """Return counts per SI unit of the values of a row that are integers of several words."""
+        """Return the high words per SI unit of those of a row's values that are long integers."""
         registers = [
             self.parts[k].reader.block.registers.get(quantity) for k, quantity, _ in self._picked
         ]
         return {
-            at: 1.0 / one.step
+            at: 1.0 / (one.step * one.word)
             for at, one in enumerate(registers)
             if one is not None and one.counts is not None and one.registers > 1
         }

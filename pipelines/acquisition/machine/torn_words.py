@@ -1,8 +1,8 @@
 """Rows with a long value whose words are of two samples.
 
 A device that does not latch the words of a value together may send the high word of one sample
-with the low word of the next. Where the low word has wrapped meanwhile, the value is wrong by 65536
-counts, for that one row.
+with the low word of the next. Where the low word has wrapped meanwhile, the value is wrong by one
+of the high word, which is 65536 counts of a binary value, for that one row.
 """
 
 from collections import deque
@@ -13,31 +13,37 @@ from typing import Generic, TypeVar
 
 Row = TypeVar("Row")
 
-WORD = 65536
-"""Counts that a wrong high word is worth."""
-NEAR = WORD // 8
-"""Largest change from row to row in a value of which such a leap is no accident, counts."""
+NEAR = 1.0 / 8.0
+"""Largest change from row to row in a value of which such a leap is no accident, high words."""
 
 
 def is_leap(change: float, within: float = NEAR) -> bool:
-    """Return whether a change is that of a high word one too large or small, within some counts."""
-    return abs(abs(change) - WORD) <= within
+    """Return whether a change is that of a high word one too large or small.
+
+    Parameters
+    ----------
+    change : float
+        High words.
+    within : float, optional
+        Deviation that is allowed, high words.
+    """
+    return abs(abs(change) - 1.0) <= within
 
 
 class TornRows(Generic[Row]):
     """Holds a row back while one of its values may be torn."""
 
-    def __init__(self, columns: Sequence[int], counts_per_unit: Sequence[float]) -> None:
+    def __init__(self, columns: Sequence[int], high_words_per_unit: Sequence[float]) -> None:
         """Watch some values of a row, each an integer of several words.
 
         Parameters
         ----------
         columns : sequence of int
             Their indices in the values of a row.
-        counts_per_unit : sequence of float
-            Counts per SI unit of each.
+        high_words_per_unit : sequence of float
+            How many of its high word each has per SI unit.
         """
-        self._columns, self._counts_per_unit = tuple(columns), tuple(counts_per_unit)
+        self._columns, self._per_unit = tuple(columns), tuple(high_words_per_unit)
         # Changes of each value that must have been small: noise of a word's size is no tear.
         before = 10
         self._changes = [deque[float](maxlen=before) for _ in columns]
@@ -63,22 +69,22 @@ class TornRows(Generic[Row]):
             SI units.
         """
         most_held, at_first = 5, 5
-        counts = tuple(
-            values[at] * each for at, each in zip(self._columns, self._counts_per_unit, strict=True)
+        high_words = tuple(
+            values[at] * each for at, each in zip(self._columns, self._per_unit, strict=True)
         )
         if self._first is not None and self._columns:
-            self._first.append((row, number, counts))
+            self._first.append((row, number, high_words))
             return self._begin(self._first) if len(self._first) == at_first else []
-        changes, near = self._changes_to(counts), self._near(number)
+        changes, near = self._changes_to(high_words), self._near(number)
         leaps = [is_leap(change, close) for change, close in zip(changes, near, strict=True)]
         if not self._held and not any(leaps):
-            return self._release(row, number, counts)
+            return self._release(row, number, high_words)
         is_back = all(abs(change) <= close for change, close in zip(changes, near, strict=True))
         if self._held and is_back:
             self.torn += len(self._held)
             self._held.clear()
-            return self._release(row, number, counts)
-        self._held.append((row, number, counts))
+            return self._release(row, number, high_words)
+        self._held.append((row, number, high_words))
         if len(self._held) <= most_held and any(leaps):
             return []
         held, self._held = self._held, []
@@ -91,11 +97,13 @@ class TornRows(Generic[Row]):
         a row less is better than a wrong one.
         """
         self._first = None
-        middle = [median(values) for values in zip(*(counts for *_, counts in first), strict=True)]
+        middle = [
+            median(values) for values in zip(*(high_words for *_, high_words in first), strict=True)
+        ]
         whole = [
             one
             for one in first
-            if not any(is_leap(x - m, WORD / 4) for x, m in zip(one[2], middle, strict=True))
+            if not any(is_leap(x - m, 0.25) for x, m in zip(one[2], middle, strict=True))
         ]
         steps = [
             abs(b - a) for (*_, x), (*_, y) in pairwise(whole) for a, b in zip(x, y, strict=True)
@@ -105,14 +113,14 @@ class TornRows(Generic[Row]):
         self.torn += len(first) - len(whole)
         return [one for each in whole for one in self._release(*each)]
 
-    def _changes_to(self, counts: tuple[float, ...]) -> list[float]:
-        last = counts if self._last is None else self._last[1]
-        return [now - before for now, before in zip(counts, last, strict=True)]
+    def _changes_to(self, high_words: tuple[float, ...]) -> list[float]:
+        last = high_words if self._last is None else self._last[1]
+        return [now - before for now, before in zip(high_words, last, strict=True)]
 
     def _near(self, number: int) -> list[float]:
-        """Return by how much each value may change up to a sample, counts; -1 if unknown."""
+        """Return by how much each value may change up to a sample, high words; -1 if unknown."""
         # The motion may become faster; beyond a quarter of a word the two look alike.
-        faster, least, most, enough = 4.0, WORD / 32, WORD / 4, 3
+        faster, least, most, enough = 4.0, 1.0 / 32.0, 0.25, 3
         passed = number - self._last[0] if self._last else 1
         return [
             min(max(faster * passed * max(before), least), most)
@@ -121,10 +129,10 @@ class TornRows(Generic[Row]):
             for before in self._changes
         ]
 
-    def _release(self, row: Row, number: int, counts: tuple[float, ...]) -> list[Row]:
+    def _release(self, row: Row, number: int, high_words: tuple[float, ...]) -> list[Row]:
         if self._last is not None:
             passed = max(1, number - self._last[0])
-            for before, change in zip(self._changes, self._changes_to(counts), strict=True):
+            for before, change in zip(self._changes, self._changes_to(high_words), strict=True):
                 before.append(abs(change) / passed)
-        self._last = number, counts
+        self._last = number, high_words
         return [row]

@@ -52,6 +52,10 @@ def check_block(block: Settings, name: str) -> None:
     for quantity in ("sequence", "heartbeat"):
         if quantity in registers:
             check_counter(registers[quantity], f"{name}.{quantity}")
+    if "time" in registers and registers["time"].encoding != "binary":
+        raise ValueError(
+            f"{name}.time.encoding: found {registers['time'].encoding}, expected a binary clock"
+        )
     if "time" in registers and registers["time"].scale < 0.0:
         raise ValueError(
             f"{name}.time.scale: found {registers['time'].scale:g}, expected a clock that goes"
@@ -104,12 +108,13 @@ def check_counter(register: Register, name: str) -> None:
     Raises
     ------
     ValueError
-        It has a scale, an offset or a sign; names its place in the file.
+        It has a scale, an offset, a sign or decimal digits; names its place in the file.
     """
-    if not register.is_unsigned or (register.scale, register.offset) != (1.0, 0.0):
+    is_plain = register.encoding == "binary" and register.is_unsigned
+    if not is_plain or (register.scale, register.offset) != (1.0, 0.0):
         *others, last = (kind for kind, code in STRUCT_CODES.items() if code.isupper())
         raise ValueError(
             f"{name}: found {register.type} with scale {register.scale:g} and offset"
             f" {register.offset:g}, expected {', '.join(others)} or {last} without scale or offset"
-            f"{'; remove sign_bit' if register.sign_bit is not None else ''}"
+            f"{'' if is_plain else ', and no encoding, sign_bit or direction'}"
         )

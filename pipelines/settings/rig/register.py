@@ -27,6 +27,11 @@ STRUCT_CODES: dict[RegisterType, str] = {
 The number of bits is in the type's name, and may be less than that of its registers. A count of 24
 bits in two registers is read as one of 32, which is right if the device extends its sign.
 """
+Encoding = Literal["binary", "mod10", "bcd"]
+DIGITS: dict[Encoding, tuple[int, int]] = {"mod10": (16, 10_000), "bcd": (4, 10)}
+"""Bits and base of each digit of a decimal encoding."""
+WORD = 65536
+"""Counts that one of a binary value's high word is worth."""
 REGISTERS = {kind: struct.calcsize(f">{code}") // 2 for kind, code in STRUCT_CODES.items()}
 """Registers of 16 bits that a value takes."""
 
@@ -72,6 +77,23 @@ DIMENSION = {
 """Units that a register of each quantity may have, the SI unit first."""
 
 
+class Direction(Settings):
+    """A register that has the sign of a magnitude in another one."""
+
+    address: int = Field(ge=0, le=65535, description="Address of the register.")
+    mask: int = Field(0xFFFF, ge=1, le=65535, description="Bits of it that have the sign.")
+    negative: int = Field(ge=0, le=65535, description="Value of these bits below zero.")
+
+    @model_validator(mode="after")
+    def _is_possible(self) -> Self:
+        if self.negative & ~self.mask:
+            raise ValueError(
+                f"negative: found 0x{self.negative:04X}, expected bits of mask 0x{self.mask:04X}"
+                " only; correct one of them"
+            )
+        return self
+
+
 class Register(Settings):
     """Where a value lies and how its bits are read: value = raw x scale + offset, in ``unit``."""
 
@@ -82,8 +104,14 @@ class Register(Settings):
     scale: float = Field(1.0, description="Units per count; negative turns the sign.")
     offset: float = Field(0.0, ge=-1e12, le=1e12, description="Value at a raw 0, in the unit.")
     unit: Unit = Field("1", description="Unit of the scaled value.")
+    encoding: Encoding = Field(
+        "binary", description="mod10: 4 decimal digits a register; bcd: one each 4 bits."
+    )
     sign_bit: int | None = Field(
-        None, ge=3, le=62, description="Bit that is set below zero, where the rest is a magnitude."
+        None, ge=3, le=63, description="Bit that is set below zero, where the rest is a magnitude."
+    )
+    direction: Direction | None = Field(
+        None, description="Register with the sign, where this one has a magnitude."
     )
 
     @model_validator(mode="after")
@@ -95,11 +123,44 @@ class Register(Settings):
                 f"sign_bit: found {self.sign_bit} of a register of type {self.type}, expected a bit"
                 " of an unsigned type; set type to uint16, uint32 or uint64"
             )
+        self._check_encoding()
+        self._check_direction()
         if self.address + self.registers > 65536:
             raise ValueError(
                 f"address: found {self.address}, but a {self.type} there ends beyond address 65535"
             )
         return self
+
+    def _check_encoding(self) -> None:
+        """Refuse types and sign bits that an encoding by digits does not have."""
+        if self.encoding == "binary":
+            return
+        if self.type.startswith("float") or (self.encoding == "bcd" and not self._unsigned_bits):
+            expected = "an unsigned type" if self.encoding == "bcd" else "an integer"
+            raise ValueError(
+                f"encoding: found {self.encoding} with type {self.type}, expected {expected}"
+            )
+        first = self._unsigned_bits - (4 if self.encoding == "bcd" else 1)
+        if self.sign_bit is not None and self.sign_bit < first:
+            raise ValueError(
+                f"sign_bit: found {self.sign_bit}, expected {first} or more with {self.encoding}"
+                f" and {self.type}, as the bits below it are digits"
+            )
+
+    def _check_direction(self) -> None:
+        """Refuse a direction of a value that has a sign already, or that is part of it."""
+        if self.direction is None:
+            return
+        if not self._unsigned_bits or self.sign_bit is not None:
+            raise ValueError(
+                "direction: found with a value that has a sign of its own, expected a magnitude;"
+                " set type to uint16, uint32 or uint64 and leave sign_bit out"
+            )
+        if self.direction.address in self.addresses:
+            raise ValueError(
+                f"direction.address: found {self.direction.address}, a register of the value"
+                " itself; use sign_bit"
+            )
 
     @property
     def registers(self) -> int:
@@ -110,6 +171,13 @@ class Register(Settings):
     def addresses(self) -> range:
         """Addresses of its registers."""
         return range(self.address, self.address + self.registers)
+
+    @property
+    def spans(self) -> tuple[range, ...]:
+        """Addresses of its registers, and of the one with its sign where that is another."""
+        if self.direction is None:
+            return (self.addresses,)
+        return self.addresses, range(self.direction.address, self.direction.address + 1)
 
     @property
     def si(self) -> tuple[float, float]:
@@ -129,7 +197,12 @@ class Register(Settings):
     @property
     def is_unsigned(self) -> bool:
         """Whether it is a count from 0, which wraps around."""
-        return self._unsigned_bits > 0 and self.sign_bit is None
+        return self._unsigned_bits > 0 and self.sign_bit is None and self.direction is None
+
+    @property
+    def word(self) -> int:
+        """Counts that one of its high word is worth."""
+        return WORD if self.encoding == "binary" else 10_000
 
     @property
     def _unsigned_bits(self) -> int:
@@ -141,12 +214,17 @@ class Register(Settings):
         """The least and the greatest count of an integer; None for a float."""
         if STRUCT_CODES[self.type] in "fd":
             return None
-        if self.sign_bit is not None:
-            return 1 - 2**self.sign_bit, 2**self.sign_bit - 1
         bits = int(self.type.removeprefix("u").removeprefix("int"))
-        if self.is_unsigned:
-            return 0, 2**bits - 1
-        return -(2 ** (bits - 1)), 2 ** (bits - 1) - 1
+        if self.encoding == "binary" and not self._unsigned_bits:
+            return -(2 ** (bits - 1)), 2 ** (bits - 1) - 1
+        if self.encoding == "binary":
+            greatest = 2 ** (bits if self.sign_bit is None else self.sign_bit) - 1
+        else:
+            width, base = DIGITS[self.encoding]
+            # A sign takes a whole digit of BCD, and of a word one bit that its digits do not need.
+            digits = bits // width - (self.encoding == "bcd" and self.sign_bit is not None)
+            greatest = base**digits - 1
+        return 0 if self.is_unsigned else -greatest, greatest
 
     @property
     def span(self) -> tuple[float, float]:

@@ -78,6 +78,7 @@ class DriveMap(Settings):
         check_block(self.read, "read")
         check_block(self.write, "write")
         self._check_functions()
+        self._check_signs()
         self._check_faults()
         self._check_enabled_bits()
         self._check_ring_counters()
@@ -126,6 +127,15 @@ class DriveMap(Settings):
                 f" {runs[-1].stop - 1} has no name, expected a block without gaps; set"
                 " write.function = 16, which writes its parts one after another"
             )
+
+    def _check_signs(self) -> None:
+        """Refuse a set-point whose sign a drive could take before or after its magnitude."""
+        for name, register in registers_of(self.write).items():
+            if register.direction is not None:
+                raise ValueError(
+                    f"write.{name}.direction: found a sign in another register, expected a value"
+                    " with its own sign; a drive could take one without the other"
+                )
 
     @property
     def read_requests(self) -> list[range]:
@@ -219,7 +229,7 @@ class DriveMap(Settings):
 
 def read_requests(read: ReadBlock) -> list[range]:
     """Return the requests that read a block."""
-    spans = [register.addresses for register in registers_of(read).values()]
+    spans = [span for register in registers_of(read).values() for span in register.spans]
     return requests_of(spans, read.most_words, across_gaps=read.across_gaps)
 
 

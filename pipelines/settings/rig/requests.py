@@ -9,8 +9,7 @@ def requests_of(spans: Iterable[range], most: int, *, across_gaps: bool = True) 
     Parameters
     ----------
     spans : iterable of range
-        Addresses of each value, which one request must carry; none longer than ``most``, none
-        shared by two values.
+        Addresses of each value, which one request must carry; none longer than ``most``.
     most : int
         Registers that one request carries.
     across_gaps : bool, optional
@@ -23,6 +22,8 @@ def requests_of(spans: Iterable[range], most: int, *, across_gaps: bool = True) 
     """
     requests: list[range] = []
     for span in sorted(spans, key=lambda one: one.start):
+        if requests and span.stop <= requests[-1].stop:  # such as a direction that two values share
+            continue
         # A request takes each value that still fits: one that ends earlier never saves another.
         fits = requests and span.stop - requests[-1].start <= most
         if fits and (across_gaps or span.start == requests[-1].stop):

@@ -44,7 +44,8 @@ class RingSettings(ReadSettings):
     def _is_possible(self) -> Self:
         check_block(self.record, "record")
         self._check_kind()
-        length = max(r.address + r.registers for r in registers_of(self.record).values())
+        registers = registers_of(self.record).values()
+        length = max(span.stop for register in registers for span in register.spans)
         if length > self.words:
             raise ValueError(
                 f"words: found {self.words}, but the record's registers take {length}; correct one"

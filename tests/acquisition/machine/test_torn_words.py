@@ -8,7 +8,7 @@ from pipelines.acquisition.machine.torn_words import TornRows
 
 def kept(counts, numbers=None):
     """Indices of the rows that are kept, of a value of one count per unit."""
-    torn = TornRows[int]([0], [1.0])
+    torn = TornRows[int]([0], [1.0 / 65536])
     rows = [row for k in numbers or range(len(counts)) for row in torn.take(k, k, [counts[k]])]
     return rows, torn.torn
 

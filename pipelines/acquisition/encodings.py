@@ -1,0 +1,108 @@
+"""Which encoding by decimal digits the values of a register show, where they are read as binary.
+
+Binary values have digits above 9 and words above 9999. A register that never has any is not binary,
+unless by chance, which becomes small with each value that could have had one.
+"""
+
+from collections.abc import Iterator
+from math import ceil, isnan
+from operator import itemgetter
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipelines.modbus.counts import count_of, raw_of
+from pipelines.settings.rig.register import DIGITS, Register
+
+CHANCE = 1e-4
+"""Largest probability that a binary register with decimal digits alone is misjudged."""
+LONGEST = 2
+"""Registers of the longest values that are judged: a float64 holds all counts of these."""
+
+
+def decimal_keys(register: Register, values: NDArray) -> dict[str, str | int]:
+    """Return the keys of a register with which its values make decimal numbers.
+
+    Parameters
+    ----------
+    register : Register
+        As in the rig file.
+    values : (n,) array
+        New values in a row, as it reads them, SI units.
+
+    Returns
+    -------
+    dict
+        Values by the rig file's keys; empty where the register is binary, or values are too few.
+    """
+    if register.counts is None or register.encoding != "binary" or register.registers > LONGEST:
+        return {}
+    scale, offset = register.si
+    read = np.round((values[np.isfinite(values)] - offset) / scale).astype(np.int64)
+    if register.direction is not None:
+        read = np.abs(read)
+    bits = 16 * register.registers
+    raw = [raw_of(register, count) % 2**bits for count in read.tolist()]
+    shown: list[tuple[float, dict[str, str | int]]] = []
+    for keys in _possible_keys(register.type, bits):
+        decimal = register.model_copy(update={"sign_bit": None, **keys})
+        counts = _decoded(decimal, raw)
+        if counts is not None and _is_no_chance(decimal, raw):
+            shown.append((float(np.abs(np.diff(counts)).sum()), keys))
+    # A sign bit may be a digit, too; where it is, values leap.
+    _, best = min(shown, key=itemgetter(0), default=(0.0, {}))
+    return {key: value for key, value in best.items() if getattr(register, key) != value}
+
+
+def _possible_keys(kind: str, bits: int) -> Iterator[dict[str, str | int]]:
+    """Yield what a rig file could say of an integer, the likeliest first."""
+    unsigned = f"uint{bits}"
+    if bits > 16:
+        yield {"encoding": "mod10", "type": kind}
+        yield {"encoding": "mod10", "type": f"int{bits}"}
+        yield {"encoding": "mod10", "type": unsigned, "sign_bit": bits - 1}
+    yield {"encoding": "bcd", "type": unsigned}
+    yield {"encoding": "bcd", "type": unsigned, "sign_bit": bits - 1}
+
+
+def _decoded(register: Register, raw: list[int]) -> NDArray | None:
+    """Return the counts (n,) of bits, given as unsigned numbers; None if a digit is not decimal."""
+    bits, is_signed = 16 * register.registers, register.type.startswith("int")
+    counts = []
+    for one in raw:
+        typed = one - 2**bits if is_signed and one >= 2 ** (bits - 1) else one
+        counts.append(count_of(register, typed))
+        if isnan(counts[-1]):
+            return None
+    return np.array(counts)
+
+
+def _is_no_chance(register: Register, raw: list[int]) -> bool:
+    """Return whether binary values (n,) would have had a digit that is not decimal."""
+    width, base = DIGITS[register.encoding]
+    bits = 16 * register.registers
+    if register.sign_bit is not None:  # a sign's digit is no evidence
+        bits = bits - width if register.encoding == "bcd" else register.sign_bit
+    share = (2 * base - 1 if register.type.startswith("int") else base) / 2**width
+    magnitudes = np.array(raw, dtype=np.int64) % 2**bits
+    return bool(share ** _independent(magnitudes, width, bits) <= CHANCE)
+
+
+def _independent(raw: NDArray, width: int, bits: int) -> int:
+    """Return how many values (n,) have a lowest digit that does not follow from the one before.
+
+    It follows from it where the value, as a binary number, changes by less than half of all that
+    the digit can be.
+    """
+    step = int(np.gcd.reduce(np.diff(raw))) if len(raw) > 1 else 0
+    if not step:
+        return 0
+    # Values in coarse steps leave the lowest digits constant, or let them have a few values only.
+    constant_bits = (step & -step).bit_length() - 1
+    far = 2 ** (width * ceil(constant_bits / width) + width - 1)
+    count, last = 0, int(raw[0])
+    for value in raw.tolist():
+        change = (value - last) % 2**bits
+        if min(change, 2**bits - change) >= far:
+            count, last = count + 1, value
+    return count

@@ -1,0 +1,76 @@
+"""What a channel's values show to be wrong, though each of them is possible."""
+
+from collections.abc import Iterator
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipelines.acquisition.encodings import decimal_keys
+from pipelines.settings.rig import Register
+from pipelines.signals.folded import is_folded
+from pipelines.signals.held import are_held, new_values
+from pipelines.signals.sampling import sample_rate
+
+
+def misread(quantity: str, register: Register, where: str, values: NDArray) -> Iterator[str]:
+    """Yield how the values of a register are misread, and the keys that mend it.
+
+    Parameters
+    ----------
+    quantity : str
+        Which the register holds.
+    register : Register
+        As in the rig file.
+    where : str
+        Its place there.
+    values : (n,) array
+        In a row, as it reads them, SI units; NaN where missing.
+    """
+    if not register.turn and (rows := _at_an_end(register, values)):
+        yield (
+            f"{rows} of {len(values)} values are at the end of their register, where larger ones"
+            " are cut off; let the device write coarser units, or two registers"
+        )
+    new = values[new_values(values)]
+    keys = decimal_keys(register, new)
+    if keys:
+        written = " and ".join(
+            f'{key} = "{value}"' if isinstance(value, str) else f"{key} = {value}"
+            for key, value in keys.items()
+        )
+        yield f"all digits are decimal, so the register is not binary; set {where}.{written}"
+    elif quantity in ("torque", "current") and is_folded(new - register.si[1]):
+        yield (
+            "values turn round at 0 as those of a magnitude do, so that their sign is missing; set"
+            f" {where}.direction to the register that has it, or sign_bit"
+        )
+
+
+def held(time_s: NDArray, values: NDArray) -> Iterator[str]:
+    """Yield that new values come less often than rows, as in the copy that a gateway keeps.
+
+    Each value is then true at some row before.
+
+    Parameters
+    ----------
+    time_s : (n,) array
+        Of each row, s.
+    values : (n,) array
+        In any unit, NaN where missing.
+    """
+    if are_held(values):
+        rate_hz = sample_rate(time_s[new_values(values)])
+        yield (
+            f"new values come at {rate_hz:.3g} Hz, and rows at {sample_rate(time_s):.3g} Hz; let"
+            " the device or gateway renew its registers faster, or record at that rate"
+        )
+
+
+def _at_an_end(register: Register, values: NDArray) -> int:
+    """Return how many values are the largest, or smallest, that a register can hold."""
+    low, high = register.span
+    ends = [low, high]
+    if register.is_unsigned:  # a raw 0 is no end that cuts off, but where an idle value lies
+        ends = [high if register.scale > 0.0 else low]
+    at_an_end = [np.isclose(values, end, rtol=1e-9) for end in ends if np.isfinite(end)]
+    return int(np.count_nonzero(np.any(at_an_end, axis=0))) if at_an_end else 0

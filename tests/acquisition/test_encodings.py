@@ -1,0 +1,64 @@
+"""Decimal digits are distinguished from binary values by more than chance."""
+
+import numpy as np
+import pytest
+
+from pipelines.acquisition.encodings import CHANCE, decimal_keys
+from pipelines.modbus.register_block import Block
+from pipelines.settings.rig import Register
+
+SWING = np.sin(0.06 * np.arange(300))
+
+
+def read(counts, device, used):
+    """Return the counts that a register map finds in a device of another encoding."""
+    device, used = (Block({"x": Register(address=0, **keys)}) for keys in (device, used))
+    return np.array([used.decode(device.encode({"x": count}))["x"] for count in counts])
+
+
+MOD10 = {"encoding": "mod10"}
+BCD = {"encoding": "bcd"}
+WORD, LONG = {"type": "uint16"}, {"type": "uint32"}
+SIGN, LONG_SIGN = {"sign_bit": 15}, {"sign_bit": 31}
+SIGNED, LONG_SIGNED = {"type": "int16"}, {"type": "int32"}
+
+
+@pytest.mark.parametrize(
+    ("device", "used", "counts", "missing"),
+    [
+        (LONG | MOD10, LONG_SIGNED, 25000 * (1 + SWING), MOD10),
+        (LONG_SIGNED | MOD10, LONG_SIGNED, 25000 * SWING, MOD10),
+        (LONG | MOD10 | LONG_SIGN, LONG_SIGNED, 25000 * SWING, MOD10 | LONG | LONG_SIGN),
+        (LONG | MOD10 | LONG_SIGN, LONG | LONG_SIGN, 25000 * SWING, MOD10),
+        (WORD | BCD, WORD, 200 * (1 + SWING), BCD),
+        (WORD | BCD, WORD, np.round(300 * (1 + SWING), -1), BCD),
+        (WORD | BCD | SIGN, WORD | SIGN, 300 * SWING, BCD),
+        (WORD | BCD | SIGN, SIGNED, 300 * SWING, BCD | WORD | SIGN),
+        (LONG | BCD, LONG_SIGNED, 2e5 * (1 + SWING), BCD | LONG),
+    ],
+)
+def test_digits_are_named_and_nothing_is_where_they_are_read_as_such(device, used, counts, missing):
+    values = read(counts, device, used)
+    assert decimal_keys(Register(address=0, **used), values) == missing
+    assert decimal_keys(Register(address=0, **device), read(counts, device, device)) == {}
+
+
+def test_too_few_values_show_nothing():
+    values = read(30 * (1 + SWING), {"type": "uint16", **BCD}, {"type": "uint16"})
+    assert decimal_keys(Register(address=0, type="uint16"), values[:30]) == {}
+
+
+def test_binary_values_are_hardly_ever_taken_for_digits():
+    alarms, registers, most_tried = 0, 1000, 5
+    for seed in range(registers):
+        rng = np.random.default_rng(seed)
+        register = Register(address=0, type=str(rng.choice(["int16", "uint16", "int32", "uint32"])))
+        low, high = register.counts
+        size = 10 ** rng.uniform(1.0, np.log10(high))
+        # Coarse steps leave low digits constant.
+        step = 2.0 ** rng.integers(0, 12) * rng.choice([1, 3, 5, 10])
+        counts = size * (SWING + 10 ** rng.uniform(-4.0, 0.0) * rng.normal(size=len(SWING)))
+        counts = np.round((np.abs(counts) if low == 0 else counts) / step) * step
+        alarms += bool(decimal_keys(register, np.clip(counts, low, high)))
+    # Twice the probability that is allowed for each encoding that is tried.
+    assert alarms <= 2 * CHANCE * most_tried * registers

@@ -1,0 +1,61 @@
+"""A magnitude without its sign is named, and no channel that ends at zero or touches it is."""
+
+import numpy as np
+import pytest
+
+from pipelines.signals.folded import is_folded
+
+SEEDS = 100
+SECONDS = np.arange(300) / 100.0
+
+
+def torque(rng, noise=0.0, friction=0.0):
+    """Return a torque of about 10 N·m that crosses zero, in steps of 0.01 N·m."""
+    speed, *phases = rng.uniform([3.0, 0.0, 0.0, 0.0], [12.0, 6.0, 6.0, 6.0])
+    values = 10.0 * np.sin(speed * SECONDS + phases[0])
+    values += 3.0 * np.sin(2.3 * speed * SECONDS + phases[1])
+    values += friction * np.sign(np.cos(speed * SECONDS + phases[2]))
+    return np.round(values + rng.normal(0.0, noise, len(SECONDS)), 2)
+
+
+def touching(rng, noise):
+    """Return a torque that touches zero smoothly, and ends there."""
+    speed, phase = rng.uniform([3.0, 0.0], [12.0, 6.0])
+    values = 10.0 * (1.0 - np.cos(speed * SECONDS + phase))
+    return np.maximum(np.round(values + rng.normal(0.0, noise, len(SECONDS)), 2), 0.0)
+
+
+def share(channel):
+    return np.mean([is_folded(channel(np.random.default_rng(seed))) for seed in range(SEEDS)])
+
+
+@pytest.mark.parametrize(("noise", "least"), [(0.0, 0.9), (0.05, 0.8), (0.2, 0.5)])
+@pytest.mark.parametrize("friction", [0.0, 2.0])
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_a_magnitude_is_named(noise, least, friction, sign):
+    assert share(lambda rng: sign * np.abs(torque(rng, noise, friction))) >= least
+
+
+@pytest.mark.parametrize(
+    "channel",
+    [
+        lambda rng: torque(rng, 0.05),
+        lambda rng: 20.0 + torque(rng, 0.05),
+        lambda rng: np.maximum(torque(rng, 0.05), 0.0),
+        lambda rng: np.maximum(torque(rng, 0.5), 0.0),
+        lambda rng: touching(rng, 0.0),
+        lambda rng: touching(rng, 0.05),
+        lambda rng: touching(rng, 0.5),
+        lambda rng: np.maximum(np.round(rng.normal(0.3, 0.5, len(SECONDS))), 0.0),
+        lambda rng: 10.0 * (np.sin(rng.uniform(10.0, 60.0) * SECONDS) > 0.0),
+        lambda rng: np.zeros(0),
+        lambda rng: np.zeros(len(SECONDS)),
+    ],
+    ids=[
+        *("with its sign", "above zero", "cut off at zero", "cut off, noisy"),
+        *("touching zero", "touching, some noise", "touching, noisy", "coarse at rest"),
+        *("pulses", "no rows", "all zero"),
+    ],
+)
+def test_no_other_channel_is(channel):
+    assert share(channel) <= 0.02
