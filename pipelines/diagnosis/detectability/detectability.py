@@ -13,8 +13,7 @@ with z_a^2 twice the price and z_b for the required power. A good rig shows a li
 (``Criteria.background_cause``), so the smallest size also exceeds that by as much.
 """
 
-import itertools
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cache
 
@@ -23,17 +22,25 @@ from numpy.typing import NDArray
 from scipy.optimize import brentq
 from scipy.stats import ncx2
 
-from pipelines.diagnosis.candidates.candidate import TURNS, Candidate, proposals
+from pipelines.diagnosis.candidates.candidate import Candidate, proposals
 from pipelines.diagnosis.candidates.columns import torque_columns
 from pipelines.diagnosis.candidates.library import Report, silent
-from pipelines.diagnosis.candidates.shape_grid import BENDING, values_in, values_of
 from pipelines.diagnosis.criteria import CRITERIA
-from pipelines.diagnosis.evidence.baseline import Baseline, baseline_of, with_load
-from pipelines.diagnosis.evidence.baseline_columns import columns_under, gram_of_runs
+from pipelines.diagnosis.detectability.detection_problem import DetectionProblem
+from pipelines.diagnosis.detectability.directions import (
+    bend,
+    chosen_columns,
+    direction_of,
+    levels,
+    orthonormal,
+    squared,
+    unit_vector,
+)
+from pipelines.diagnosis.detectability.shapes import shapes_of
+from pipelines.diagnosis.evidence.baseline import Baseline, baseline_of
 from pipelines.diagnosis.evidence.block_rate import at_block_rate
 from pipelines.diagnosis.evidence.downsampling import downsampled
 from pipelines.diagnosis.evidence.eligibility import refuse_unfit
-from pipelines.diagnosis.evidence.gram import solve
 from pipelines.diagnosis.evidence.known_effects import known_effects
 from pipelines.diagnosis.evidence.noise_floor import Floor, noise_floor
 from pipelines.diagnosis.evidence.observed_run import Run, observe
@@ -43,7 +50,6 @@ from pipelines.diagnosis.selection.prior import FEATURES, weights
 from pipelines.effects import Effect, Parameter
 from pipelines.mechanics.motion import Motion
 from pipelines.mechanics.scale import on_one_scale
-from pipelines.model import TermColumns
 
 
 @dataclass(frozen=True)
@@ -109,129 +115,6 @@ class Detectable:
 
 
 @dataclass(frozen=True)
-class DetectionProblem:
-    """Detection problem of some runs: rows in units of the noise, the baseline projected out."""
-
-    runs: tuple[Run, ...]
-    baseline: Baseline
-    untouched: tuple[NDArray, ...]
-    values: NDArray
-    """The baseline's values under which the motion is transformed."""
-    root: NDArray
-    """(O,) root of the independent share over the noise; zero without such an output."""
-    independent: float
-    """Independent samples of the output that has most."""
-    basis: NDArray
-    """(rows, size) orthonormal basis of the weighted baseline."""
-    torque_rms: NDArray
-    """(O,) N·m, of the baseline's torque."""
-
-    @classmethod
-    def of(cls, runs: Sequence[Run], baseline: Baseline, floor: Floor) -> "DetectionProblem":
-        """Fit the baseline and prepare its projection.
-
-        Parameters
-        ----------
-        runs : sequence of Run
-            Planned or recorded runs.
-        baseline : Baseline
-            Rigid body and friction.
-        floor : Floor
-            Noise of each output, N·m.
-        """
-        untouched = tuple(columns_under((), run, baseline)[0] for run in runs)
-        plain = gram_of_runs(runs, untouched)
-        there = np.isfinite(floor.rms) & (floor.rms > 0)
-        noise, share = np.where(there, floor.rms, 1.0), floor.independent_share
-        drives = len(noise) // 2
-        # A weight above one corrects noise that is overestimated from recordings; here it is given.
-        weights = np.minimum([CRITERIA.drive_weight, CRITERIA.cuff_weight], 1.0)
-        counts = np.repeat(weights, drives)
-        # Correlated blocks count as fewer: the likelihood is scaled by their independent share.
-        root = np.where(there, np.sqrt(counts * share) / noise, 0.0)
-        independent = float(np.max(share * plain.count))
-        values = solve(plain, root**2)
-        # Torques that depend on load take it from the fitted bodies, as in a diagnosis.
-        loaded = tuple(with_load(run, baseline, values) for run in runs)
-        torque = np.concatenate(
-            [(c @ values)[run.valid] for run, c in zip(runs, untouched, strict=True)]
-        )
-        rms = np.sqrt(np.mean(torque**2, axis=0))
-        problem = cls(loaded, baseline, untouched, values, root, independent, np.zeros((0, 0)), rms)
-        # The basis is made of weighted rows, which the problem itself provides.
-        rows = problem.rows(untouched)
-        # QR would invent a direction for a column of zeros.
-        return replace(problem, basis=np.linalg.qr(rows[:, rows.any(axis=0)])[0])
-
-    def rows(self, columns: Sequence[NDArray]) -> NDArray:
-        """Return columns as weighted rows, usable ones only.
-
-        Parameters
-        ----------
-        columns : sequence of (m, O, k) arrays
-            One of each run, N·m per unit.
-
-        Returns
-        -------
-        (rows, k) array
-            In units of the noise.
-        """
-        scaled = (c * self.root[:, np.newaxis] for c in columns)
-        return np.concatenate([s[run.usable] for run, s in zip(self.runs, scaled, strict=True)])
-
-    def remainder(self, columns: Sequence[NDArray]) -> NDArray:
-        """Return columns less their projection on the baseline.
-
-        Parameters
-        ----------
-        columns : sequence of (m, O, k) arrays
-            One of each run, N·m per unit.
-
-        Returns
-        -------
-        (rows, k) array
-            In units of the noise.
-        """
-        rows = self.rows(columns)
-        for _ in range(2):  # twice is enough for orthogonality to rounding
-            rows = rows - self.basis @ (self.basis.T @ rows)
-        return rows
-
-    def joint(self, effect: Effect) -> int:
-        """Return the joint at which an effect's size is given: its own, if it is measured.
-
-        For a whole machine it is the first, and otherwise the first measured one.
-        """
-        motion = self.runs[0].motion
-        j = max(effect.column(motion), 0)
-        return j if motion.machine.measured[j] else int(np.argmax(motion.machine.measured))
-
-    def rms(self, effect: Effect, column: Sequence[NDArray]) -> float:
-        """Return the rms of a column at the effect's joint, where it acts.
-
-        Parameters
-        ----------
-        effect : Effect
-            Whose joint and runs count.
-        column : sequence of (m, O, 1) arrays
-            One of each run, N·m.
-
-        Returns
-        -------
-        float
-            N·m.
-        """
-        j = self.joint(effect)
-        # Runs in which the effect does not act would lower its rms.
-        acting = [
-            (r, c) for r, c in zip(self.runs, column, strict=True) if effect.explains(r.motion)
-        ]
-        return float(
-            np.sqrt(np.mean(np.concatenate([c[r.usable[:, j], j, 0] for r, c in acting]) ** 2))
-        )
-
-
-@dataclass(frozen=True)
 class DetectionResult:
     """Detection result of an effect at one shape."""
 
@@ -293,7 +176,7 @@ def detectability(
         report(number / len(effects), effect.label)
         of_shapes = [
             (_bent if candidate.transforms_motion else _added)(candidate, problem, power)
-            for candidate in _shapes(effect, problem.runs)
+            for candidate in shapes_of(effect, problem.runs)
         ]
         # Where no shape is plausible, all count: every cause is reported.
         results[effect] = [one for one in of_shapes if one.plausible] or of_shapes
@@ -377,58 +260,11 @@ def needed_noncentrality(columns: int, price: float, power: float) -> float:
     return float(brentq(lambda x: ncx2.sf(price, columns, x) - power, 1e-3, 100.0 + 10.0 * price))
 
 
-def _shapes(effect: Effect, runs: Sequence[Run]) -> Iterator[Candidate]:
-    """Yield the effect with shapes that span its family."""
-    probe = Candidate(effect, ())
-    chosen = effect.directions([run.motion for run in runs])
-    if chosen:
-        yield from (Candidate(effect, (shape,) * len(runs)) for shape in chosen[0])
-        return
-    if probe.transforms_motion:
-        weak = values_of(effect.shape[0], BENDING)[-1]
-        yield Candidate(effect, ((float(weak),),) * len(runs))
-        return
-    # Parts of a run at which an effect with per-run onsets may begin.
-    onsets = (0.25, 0.5, 0.75)
-    grids = [onsets if p.per_run else _seen(effect, p, runs) for p in effect.shape]
-    for shape in itertools.product(*grids):
-        yield Candidate(effect, tuple(_in_run(effect, shape, run) for run in runs))
-
-
-def _seen(effect: Effect, parameter: Parameter, runs: Sequence[Run], most: int = 6) -> NDArray:
-    """Return at most so many values of a shape parameter that represent its range.
-
-    For a ripple, those that blocks pass. Faster ones are found at the full sampling rate
-    (``order_tracking``), where they are as detectable.
-    """
-    values = values_in(effect, parameter, most, runs)
-    if parameter.unit not in TURNS or effect.joint is None:
-        return _spread(values, most)
-    j = runs[0].motion.joint_index(effect.joint)
-    speeds = np.concatenate([run.state[1][:, j] for run in runs])
-    # A ripple of n cycles a turn has n |dq| / 2 pi Hz at the speed dq.
-    fastest = 2.0 * np.pi * runs[0].bandwidth_hz / float(np.sqrt(np.mean(speeds**2)))
-    return _spread(values[values <= max(fastest, values[0])], most)
-
-
-def _spread(values: NDArray, most: int) -> NDArray:
-    return values[np.unique(np.linspace(0, len(values) - 1, most).round().astype(int))]
-
-
-def _in_run(effect: Effect, shape: Sequence[float], run: Run) -> tuple[float, ...]:
-    begin, end = run.time[0], run.time[-1]
-    return tuple(
-        # An onset is a share of the run here; the effect needs a time.
-        float(begin + v * (end - begin) if p.per_run else v)
-        for p, v in zip(effect.shape, shape, strict=True)
-    )
-
-
 def _added(candidate: Candidate, problem: DetectionProblem, power: float) -> DetectionResult:
     """Find the size of an effect that adds torque in proportion to its amplitude."""
     effect = candidate.effect
     columns = [torque_columns(candidate, r, run) for r, run in enumerate(problem.runs)]
-    direction = _direction(effect, columns, problem)
+    direction = direction_of(effect, columns, problem)
     own = candidate.columns_in([run.motion.run for run in problem.runs])
     span = problem.remainder([own.expand(column, r) for r, column in enumerate(columns)])
     remainder = problem.remainder(direction)[:, 0]
@@ -442,62 +278,18 @@ def _added(candidate: Candidate, problem: DetectionProblem, power: float) -> Det
     # Share of a joint's torque that an effect of the largest typical size makes if it depends on
     # the motion.
     least_share = 1e-3
+    level = chosen_columns(effect, columns, levels(effect), problem.runs)
     return DetectionResult(
         candidate.shapes[0],
         size,
         size * unit if np.isfinite(size) else np.inf,
         by,
-        _squared(remainder) * growth if np.isfinite(growth) else np.inf,
-        _unit(remainder),
-        _orthonormal(span),
-        _orthonormal(problem.remainder(_wide(effect, columns, _levels(effect), problem.runs))),
+        squared(remainder) * growth if np.isfinite(growth) else np.inf,
+        unit_vector(remainder),
+        orthonormal(span),
+        orthonormal(problem.remainder(level)),
         least * unit < torque and largest * unit > least_share * torque,
     )
-
-
-def _companions(effect: Effect) -> list[int]:
-    """Return the amplitudes that may have either sign and only accompany the first one."""
-    # One that is zero by default refines the form, and no effect needs it to show.
-    refines = [p.default is not None for p in effect.linear]
-    return [i for i, p in enumerate(effect.linear) if i and p.typical[0] < 0 and not refines[i]]
-
-
-def _levels(effect: Effect) -> list[int]:
-    """Return those companions that differ in unit from the first amplitude.
-
-    A preload accompanies a stiffness, for example.
-    """
-    return [i for i in _companions(effect) if effect.linear[i].unit != effect.linear[0].unit]
-
-
-def _wide(
-    effect: Effect, columns: Sequence[NDArray], chosen: list[int], runs: Sequence[Run]
-) -> list[NDArray]:
-    """Return some of an effect's columns, per-run ones in places of their own, (m, O, k)."""
-    per_run = [effect.linear[i].per_run for i in chosen]
-    own = TermColumns.of(effect, [run.motion.run for run in runs], per_run)
-    return [own.expand(column[:, :, chosen], r) for r, column in enumerate(columns)]
-
-
-def _direction(
-    effect: Effect, columns: Sequence[NDArray], problem: DetectionProblem
-) -> list[NDArray]:
-    """Return the effect at unit magnitude, (m, O, 1) of each run.
-
-    Companions of either sign (a preload, a level, the cosine of a sine) are chosen to minimise its
-    torque: a spring rests in the middle of the motion, a drift starts at minus half of its end.
-    """
-    lead = [c[:, :, :1] for c in columns]
-    companions = _companions(effect)
-    if not companions:
-        return lead
-    wide = _wide(effect, columns, companions, problem.runs)
-    usable = [run.usable for run in problem.runs]
-    A, y = (
-        np.concatenate([c[u] for c, u in zip(part, usable, strict=True)]) for part in (wide, lead)
-    )
-    values = np.linalg.lstsq(A, y[:, 0], rcond=1e-12)[0]
-    return [c - (w @ values)[:, :, np.newaxis] for c, w in zip(lead, wide, strict=True)]
 
 
 def _bent(candidate: Candidate, problem: DetectionProblem, power: float) -> DetectionResult:
@@ -512,7 +304,7 @@ def _bent(candidate: Candidate, problem: DetectionProblem, power: float) -> Dete
     def at(x: float) -> tuple[float, str, NDArray, list[NDArray], float]:
         # Sizes span decades, so the search is over their logarithm.
         shape = zero + (start - zero) / reach * np.exp(x)
-        column = _bend(replace(candidate, shapes=(tuple(shape),) * len(problem.runs)), problem)
+        column = bend(replace(candidate, shapes=(tuple(shape),) * len(problem.runs)), problem)
         remainder = problem.remainder(column)[:, 0]
         growth, by = _growth(effect, remainder, column, 1, problem, power)
         return growth, by, remainder, column, float(effect.physical(effect.completed(shape))[0])
@@ -538,27 +330,12 @@ def _bent(candidate: Candidate, problem: DetectionProblem, power: float) -> Dete
         value if seen else np.inf,
         problem.rms(effect, column) if seen else np.inf,
         by,
-        _squared(remainder) if seen else np.inf,
-        _unit(remainder),
-        _orthonormal(remainder[:, np.newaxis]),
+        squared(remainder) if seen else np.inf,
+        unit_vector(remainder),
+        orthonormal(remainder[:, np.newaxis]),
         np.zeros((len(remainder), 0)),
         plausible=True,
     )
-
-
-def _bend(candidate: Candidate, problem: DetectionProblem) -> list[NDArray]:
-    """Return the change from the untouched to the transformed baseline, (m, O, 1) of each run.
-
-    The effect is not linear, so the baseline is computed again from the transformed motion.
-    Linearised at biased parameters, elasticity would be mistaken for an encoder offset.
-    """
-    changes = []
-    for r, (run, untouched) in enumerate(zip(problem.runs, problem.untouched, strict=True)):
-        columns, measured = columns_under([candidate.term(r)], run, problem.baseline)
-        plain = untouched @ problem.values
-        change = columns @ problem.values - plain - (measured - run.measured)
-        changes.append(change[:, :, np.newaxis])
-    return changes
 
 
 def _growth(
@@ -572,10 +349,10 @@ def _growth(
     """Return the factor by which an effect's square must grow to be named, and its limit."""
     # Share of an effect's square that the baseline does not explain, below which it explains all.
     nothing = 1e-10
-    if _squared(remainder) <= nothing * _squared(problem.rows(column)[:, 0]):
+    if squared(remainder) <= nothing * squared(problem.rows(column)[:, 0]):
         return np.inf, "noise"
     price = 0.5 * columns * np.log(problem.independent) - weights(CRITERIA)[FEATURES.index("cause")]
-    by_noise = needed_noncentrality(columns, price, power) / _squared(remainder)
+    by_noise = needed_noncentrality(columns, price, power) / squared(remainder)
     # A good rig has a little of the effect: its amplitude is uncertain by that much.
     torque = max(float(problem.torque_rms[problem.joint(effect)]), np.finfo(float).tiny)
     share = problem.rms(effect, column) / torque
@@ -655,22 +432,3 @@ def _explained(directions: NDArray, spans: Sequence[NDArray]) -> NDArray:
     ends = np.cumsum([0, *(span.shape[1] for span in spans)])
     total = np.hstack([np.zeros((len(squares), 1)), np.cumsum(squares, axis=1)])
     return total[:, ends[1:]] - total[:, ends[:-1]]
-
-
-def _squared(x: NDArray) -> float:
-    return float(np.sum(x * x))
-
-
-def _unit(x: NDArray) -> NDArray:
-    length = np.sqrt(_squared(x))
-    return x / length if length > 0 else x
-
-
-def _orthonormal(columns: NDArray) -> NDArray:
-    """Return an orthonormal basis of the columns that are not zero, (rows, k)."""
-    size = np.linalg.norm(columns, axis=0)
-    if not size.any():
-        return columns[:, :0]
-    scaled = columns / np.where(size > 0, size, 1.0)
-    u, s, _ = np.linalg.svd(scaled, full_matrices=False)
-    return u[:, s > 1e-8 * s[0]]

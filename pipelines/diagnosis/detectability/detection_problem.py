@@ -1,0 +1,138 @@
+"""The rows in which an effect must show, in units of the noise and without the baseline's share."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipelines.diagnosis.criteria import CRITERIA
+from pipelines.diagnosis.evidence.baseline import Baseline, with_load
+from pipelines.diagnosis.evidence.baseline_columns import columns_under, gram_of_runs
+from pipelines.diagnosis.evidence.gram import solve
+from pipelines.diagnosis.evidence.noise_floor import Floor
+from pipelines.diagnosis.evidence.observed_run import Run
+from pipelines.effects import Effect
+
+
+@dataclass(frozen=True)
+class DetectionProblem:
+    """Detection problem of some runs: rows in units of the noise, the baseline projected out."""
+
+    runs: tuple[Run, ...]
+    baseline: Baseline
+    untouched: tuple[NDArray, ...]
+    values: NDArray
+    """The baseline's values under which the motion is transformed."""
+    root: NDArray
+    """(O,) root of the independent share over the noise; zero without such an output."""
+    independent: float
+    """Independent samples of the output that has most."""
+    basis: NDArray
+    """(rows, size) orthonormal basis of the weighted baseline."""
+    torque_rms: NDArray
+    """(O,) N·m, of the baseline's torque."""
+
+    @classmethod
+    def of(cls, runs: Sequence[Run], baseline: Baseline, floor: Floor) -> "DetectionProblem":
+        """Fit the baseline and prepare its projection.
+
+        Parameters
+        ----------
+        runs : sequence of Run
+            Planned or recorded runs.
+        baseline : Baseline
+            Rigid body and friction.
+        floor : Floor
+            Noise of each output, N·m.
+        """
+        untouched = tuple(columns_under((), run, baseline)[0] for run in runs)
+        plain = gram_of_runs(runs, untouched)
+        there = np.isfinite(floor.rms) & (floor.rms > 0)
+        noise, share = np.where(there, floor.rms, 1.0), floor.independent_share
+        drives = len(noise) // 2
+        # A weight above one corrects noise that is overestimated from recordings; here it is given.
+        weights = np.minimum([CRITERIA.drive_weight, CRITERIA.cuff_weight], 1.0)
+        counts = np.repeat(weights, drives)
+        # Correlated blocks count as fewer: the likelihood is scaled by their independent share.
+        root = np.where(there, np.sqrt(counts * share) / noise, 0.0)
+        independent = float(np.max(share * plain.count))
+        values = solve(plain, root**2)
+        # Torques that depend on load take it from the fitted bodies, as in a diagnosis.
+        loaded = tuple(with_load(run, baseline, values) for run in runs)
+        torque = np.concatenate(
+            [(c @ values)[run.valid] for run, c in zip(runs, untouched, strict=True)]
+        )
+        rms = np.sqrt(np.mean(torque**2, axis=0))
+        problem = cls(loaded, baseline, untouched, values, root, independent, np.zeros((0, 0)), rms)
+        # The basis is made of weighted rows, which the problem itself provides.
+        rows = problem.rows(untouched)
+        # QR would invent a direction for a column of zeros.
+        return replace(problem, basis=np.linalg.qr(rows[:, rows.any(axis=0)])[0])
+
+    def rows(self, columns: Sequence[NDArray]) -> NDArray:
+        """Return columns as weighted rows, usable ones only.
+
+        Parameters
+        ----------
+        columns : sequence of (m, O, k) arrays
+            One of each run, N·m per unit.
+
+        Returns
+        -------
+        (rows, k) array
+            In units of the noise.
+        """
+        scaled = (c * self.root[:, np.newaxis] for c in columns)
+        return np.concatenate([s[run.usable] for run, s in zip(self.runs, scaled, strict=True)])
+
+    def remainder(self, columns: Sequence[NDArray]) -> NDArray:
+        """Return columns less their projection on the baseline.
+
+        Parameters
+        ----------
+        columns : sequence of (m, O, k) arrays
+            One of each run, N·m per unit.
+
+        Returns
+        -------
+        (rows, k) array
+            In units of the noise.
+        """
+        rows = self.rows(columns)
+        for _ in range(2):  # twice is enough for orthogonality to rounding
+            rows = rows - self.basis @ (self.basis.T @ rows)
+        return rows
+
+    def joint(self, effect: Effect) -> int:
+        """Return the joint at which an effect's size is given: its own, if it is measured.
+
+        For a whole machine it is the first, and otherwise the first measured one.
+        """
+        motion = self.runs[0].motion
+        j = max(effect.column(motion), 0)
+        return j if motion.machine.measured[j] else int(np.argmax(motion.machine.measured))
+
+    def rms(self, effect: Effect, column: Sequence[NDArray]) -> float:
+        """Return the rms of a column at the effect's joint, where it acts.
+
+        Parameters
+        ----------
+        effect : Effect
+            Whose joint and runs count.
+        column : sequence of (m, O, 1) arrays
+            One of each run, N·m.
+
+        Returns
+        -------
+        float
+            N·m.
+        """
+        j = self.joint(effect)
+        # Runs in which the effect does not act would lower its rms.
+        acting = [
+            (r, c) for r, c in zip(self.runs, column, strict=True) if effect.explains(r.motion)
+        ]
+        return float(
+            np.sqrt(np.mean(np.concatenate([c[r.usable[:, j], j, 0] for r, c in acting]) ** 2))
+        )
