@@ -17,6 +17,8 @@ def polish(
     costs: Callable[[NDArray], NDArray],
     rng: np.random.Generator,
     out_of_time: Callable[[], bool],
+    patience: int = 60,
+    least_gain: float = 1e-6,
 ) -> tuple[NDArray, float]:
     """Minimize from ``start`` until the cost stagnates.
 
@@ -32,6 +34,10 @@ def polish(
         Random numbers.
     out_of_time : callable
         Returns whether to stop.
+    patience : int, optional
+        Generations without a gain after which the cost stagnates.
+    least_gain : float, optional
+        Smallest relative gain that counts.
 
     Returns
     -------
@@ -43,8 +49,6 @@ def polish(
     population, generations = 24, 2000
     # The decomposition costs as much as several candidates, and the covariance changes slowly.
     generations_per_decomposition = 5
-    # Generations without this relative gain after which the cost stagnates.
-    patience, least_gain = 60, 1e-6
     size = len(start)
     # Default weights and constants of the tutorial, for a given population.
     rank = np.arange(1, population // 2 + 1)

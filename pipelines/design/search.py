@@ -49,14 +49,14 @@ def search(
     rng = np.random.default_rng(settings.seed)
     # The swarm only has to find the region. A coarse grid is five times as fast, and its bounds
     # are as strict.
-    coarse = _problem(settings, geometry, samples=200, samples_per_harmonic=40)
-    fine = _problem(settings, geometry, samples=1000, samples_per_harmonic=100)
+    coarse = search_problem(settings, geometry, samples=200, samples_per_harmonic=40)
+    fine = search_problem(settings, geometry, samples=1000, samples_per_harmonic=100)
     spread = spread_of(fine)
 
     def note(cost: float) -> str:
         return f"{settings.criterion} {-cost if settings.criterion == 'log_det' else cost:.4g}"
 
-    swarm = _first_swarm(settings, coarse, spread, rng)
+    swarm = first_swarm(settings, coarse, spread, rng)
     fly(swarm, coarse, True, 0, rng)  # Compiles before the search time begins.
     deadline = time.monotonic() + settings.seconds
     stopped_by = _let_fly(
@@ -84,12 +84,23 @@ def search(
             "no excitation within the bounds separates the parameters; widen [design.bounds] or"
             " add harmonics"
         )
-    return _trajectory(best, fine), "seconds" if time.monotonic() > deadline else stopped_by
+    return trajectory_of(best, fine), "seconds" if time.monotonic() > deadline else stopped_by
 
 
-def _problem(
+def search_problem(
     settings: DesignSettings, geometry: Geometry, samples: int, samples_per_harmonic: int
 ) -> Problem:
+    """Return the constants of a search.
+
+    Parameters
+    ----------
+    settings : DesignSettings
+        Bounds, harmonics and criterion.
+    geometry : Geometry
+        Lengths and gravity.
+    samples, samples_per_harmonic : int
+        Least number of samples a period, in all and for each harmonic.
+    """
     return problem(
         omega=2.0 * np.pi * settings.base_frequency_hz,
         harmonics=settings.harmonics,
@@ -150,9 +161,22 @@ def spread_of(problem: Problem) -> NDArray:
     return np.append(coordinates, half[0]) if problem.theta0_is_free else coordinates
 
 
-def _first_swarm(
+def first_swarm(
     settings: DesignSettings, problem: Problem, spread: NDArray, rng: np.random.Generator
 ) -> Swarm:
+    """Return random particles that keep all bounds.
+
+    Parameters
+    ----------
+    settings : DesignSettings
+        Number of particles.
+    problem : Problem
+        Bounds.
+    spread : (D,) array
+        Standard deviation of each coordinate, ``spread_of``.
+    rng : Generator
+        Random numbers.
+    """
     shape = (settings.particles, len(spread))
     # Most of these break a bound; their repair puts them onto the bounds.
     position = rng.standard_normal(shape) * spread
@@ -193,7 +217,8 @@ def _let_fly(
     return "iterations"
 
 
-def _trajectory(candidate: NDArray, problem: Problem) -> FourierTrajectory:
+def trajectory_of(candidate: NDArray, problem: Problem) -> FourierTrajectory:
+    """Return the excitation that a candidate (D,) of a search is."""
     coefficients = np.empty((2, 2, len(problem.speeds)))
     expand(candidate, problem, coefficients)
     theta0 = candidate[-2:] if problem.theta0_is_free else problem.theta0

@@ -1,0 +1,1 @@
+"""The experiment that decides between causes that a verdict leaves open."""

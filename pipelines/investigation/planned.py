@@ -1,0 +1,65 @@
+"""Runs that are only planned, as a detection problem."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+from pipelines.diagnosis.detectability.detection_problem import DetectionProblem
+from pipelines.diagnosis.detectability.planned_runs import planned_motions, planned_noise
+from pipelines.diagnosis.evidence.baseline import baseline_of
+from pipelines.diagnosis.evidence.block_rate import at_block_rate
+from pipelines.diagnosis.evidence.known_effects import known_effects
+from pipelines.diagnosis.evidence.observed_run import observe
+from pipelines.effects.effect import Family
+from pipelines.investigation.rivals import Rival, refuse_hidden
+from pipelines.mechanics.trajectory import Trajectory
+from pipelines.settings.design import DesignSettings
+from pipelines.settings.rig.plant import PlantSettings
+
+
+@dataclass(frozen=True)
+class PlannedRuns:
+    """One run of each kind, with any trajectory."""
+
+    settings: DesignSettings
+    plant: PlantSettings
+    """The leg that moves; it only makes the loads on which some causes depend."""
+    kinds: tuple[str, ...] = ("exo_alone", "with_human")
+    known: tuple[str, ...] = ()
+    """Labels of effects that the machine is known to have."""
+
+    def problem(self, trajectory: Trajectory, rivals: Sequence[Rival]) -> DetectionProblem:
+        """Return the detection problem of the runs.
+
+        Where no rival depends on time, one period counts as often as it is repeated.
+
+        Parameters
+        ----------
+        trajectory : Trajectory
+            Of hip and knee.
+        rivals : sequence of Rival
+            Those that the runs are to separate.
+
+        Raises
+        ------
+        InputError
+            Where no run can show a rival.
+        """
+        noise, rate_hz = self.settings.noise, self.settings.sample_rate_hz
+        period_s, repeats = trajectory.period_s, 1.0
+        if period_s and period_s < noise.duration_s and not any(map(_depends_on_time, rivals)):
+            repeats = noise.duration_s / period_s
+            noise = noise.model_copy(update={"duration_s": period_s})
+        motions = planned_motions(trajectory, self.plant, noise, self.kinds, rate_hz)
+        refuse_hidden(rivals, motions)
+        observed = [observe(motion) for motion in motions]
+        baseline = baseline_of(observed, known_effects(self.known, motions[0].machine))
+        floor = planned_noise(noise, rate_hz, observed[0].block)
+        floor = replace(floor, independent_share=repeats * floor.independent_share)
+        return DetectionProblem.of([at_block_rate(run) for run in observed], baseline, floor)
+
+
+def _depends_on_time(rival: Rival) -> bool:
+    """Return whether a rival's torque differs from one period of the motion to the next."""
+    return rival.effect.family is Family.TIME or any(
+        shape.unit == "Hz" or shape.per_run for shape in rival.effect.shape
+    )

@@ -1,0 +1,119 @@
+"""How well runs separate rival causes: expected log odds, and the posterior to expect.
+
+A true cause A adds a torque r to the rows of a detection problem, which are in units of the noise
+and have no part that the baseline explains. A rival B with the orthonormal span Q explains |Q'r|²
+of it. The log likelihood of A then exceeds that of B by half of
+
+    |r|² - |Q'r|²
+
+in the mean (T-optimality: Atkinson and Fedorov, 1975, Biometrika 62(1)). Each amplitude costs half
+the logarithm of the independent samples. As in a diagnosis, no form is exact: a log likelihood is
+divided by one plus the model error times what causes explain.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import logsumexp
+
+from pipelines.diagnosis.criteria import CRITERIA
+from pipelines.diagnosis.detectability.detection_problem import DetectionProblem
+from pipelines.investigation.rivals import Appearance, Rival, appearances
+
+DECIDED = 0.95
+"""Posterior probability of one rival from which the others are excluded."""
+
+
+@dataclass(frozen=True)
+class Separation:
+    """How well some runs separate R rivals."""
+
+    rivals: tuple[Rival, ...]
+    shapes: tuple[tuple[Appearance, ...], ...]
+    """Of each rival."""
+    price: float
+    """Log likelihood that each amplitude costs."""
+
+    @classmethod
+    def of(cls, rivals: Sequence[Rival], problem: DetectionProblem) -> "Separation":
+        """Compute how the rivals look in a detection problem's rows."""
+        shapes = tuple(tuple(appearances(rival, problem)) for rival in rivals)
+        return cls(tuple(rivals), shapes, 0.5 * float(np.log(problem.independent)))
+
+    def log_odds(self) -> NDArray:
+        """Return the expected log odds (R, R) of each truth against each rival, priors apart.
+
+        The mean over the truth's shapes; of the rival, the shape counts that is most alike.
+        """
+        odds = np.zeros((len(self.rivals), len(self.rivals)))
+        for i, of_truth in enumerate(self.shapes):
+            for j, of_rival in enumerate(self.shapes):
+                if i != j:
+                    odds[i, j] = np.mean([self._against(one, of_rival) for one in of_truth])
+        return odds
+
+    def least(self) -> float:
+        """Return the least of the expected log odds: the worst pair counts."""
+        odds = self.log_odds()
+        return float(np.min(odds[~np.eye(len(odds), dtype=bool)]))
+
+    def _against(self, truth: Appearance, rivals: Sequence[Appearance]) -> float:
+        """Return the expected log odds of a truth against the rival shape that is most alike."""
+        power = float(truth.torque @ truth.torque)
+        width = truth.span.shape[1]
+        return min(
+            0.5 * _tempered(power, power - _squared(rival.span.T @ truth.torque))
+            + self.price * (rival.span.shape[1] - width)
+            for rival in rivals
+        )
+
+    def posterior(self, draws: int = 400, seed: int = 1) -> NDArray:
+        """Simulate the experiment and return the posteriors of all rivals under each truth.
+
+        Parameters
+        ----------
+        draws : int, optional
+            Simulated experiments for each truth, over all its shapes.
+        seed : int, optional
+            Of their noise.
+
+        Returns
+        -------
+        (R, draws, R) array
+            Truth, experiment, rival.
+        """
+        rng = np.random.default_rng(seed)
+        flat = [shape for own in self.shapes for shape in own]
+        # Only the part of the rows that some rival can explain distinguishes them.
+        basis, _ = np.linalg.qr(np.hstack([shape.span for shape in flat]))
+        spans = [[basis.T @ shape.span for shape in own] for own in self.shapes]
+        prior = np.log([rival.probability for rival in self.rivals])
+        prices = np.array([self.price * own[0].shape[1] for own in spans])
+        result = np.zeros((len(self.rivals), draws, len(self.rivals)))
+        for i, own in enumerate(self.shapes):
+            torques = np.array([basis.T @ shape.torque for shape in own])
+            y = torques[np.arange(draws) % len(own)] + rng.standard_normal((draws, basis.shape[1]))
+            # Power that each shape of each rival explains, (shapes, draws).
+            explained = [np.array([_squared(y @ q) for q in of_rival]) for of_rival in spans]
+            most = np.max([power.max(axis=0) for power in explained], axis=0)
+            evidence = np.array(
+                [
+                    logsumexp(0.5 * _tempered(most, power), axis=0) - np.log(len(power))
+                    for power in explained
+                ]
+            )
+            log = evidence.T + prior - prices
+            result[i] = np.exp(log - logsumexp(log, axis=1, keepdims=True))
+        return result
+
+
+def _squared(x: NDArray) -> NDArray:
+    """Return the sum of squares along the last axis."""
+    return np.sum(x * x, axis=-1)
+
+
+def _tempered(power: NDArray | float, part: NDArray | float) -> NDArray:
+    """Return a part of the power that causes explain, as the model's error lets it count."""
+    return np.asarray(part) / (1.0 + CRITERIA.model_error * np.asarray(power))
