@@ -50,6 +50,10 @@ class Unanswered(DeviceError):
     """A device gave no answer in time; a moving leg tolerates one."""
 
 
+class Disconnected(DeviceError):
+    """The other end refused the connection, or closed it."""
+
+
 @contextmanager
 def about(file: Path | str | None) -> Iterator[None]:
     """Begin every error of the block with the file that it is about, if any."""

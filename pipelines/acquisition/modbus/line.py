@@ -16,7 +16,7 @@ from pipelines.acquisition.modbus.connection import client_of, explain, tls_cont
 from pipelines.acquisition.modbus.framing import Traffic
 from pipelines.acquisition.modbus.reply import InvalidReply, check_replies
 from pipelines.acquisition.modbus.unexpected import as_hex
-from pipelines.errors import DeviceError
+from pipelines.errors import DeviceError, Disconnected
 from pipelines.settings.rig import RigSettings
 from pipelines.settings.rig.devices import DeviceSettings
 from pipelines.settings.rig.line import LineSettings, NetworkLine, RtuLine, TlsLine
@@ -129,10 +129,10 @@ class Line:
                 ' "none")'
             ) from error
         if not is_open:
-            raise DeviceError(f"{self.label}: {await self._refusal()}")
+            raise Disconnected(f"{self.label}: {await self._refusal()}")
         if not self._is_open:
             self.close()
-            raise DeviceError(f"{self.label}: {self._loss()}")
+            raise Disconnected(f"{self.label}: {self._loss()}")
 
     def close(self) -> None:
         """Close the connection, if it is open."""
@@ -222,7 +222,7 @@ class Line:
         except (ModbusException, OSError) as error:
             if self.client.connected:
                 raise
-            raise DeviceError(f"{self.label}: {self._loss()}") from error
+            raise Disconnected(f"{self.label}: {self._loss()}") from error
         finally:
             if self._asking:
                 self._quiet_since = asyncio.get_running_loop().time()

@@ -3,7 +3,7 @@
 from collections.abc import Awaitable, Callable, Iterable
 
 from pipelines.acquisition.modbus.device import Device
-from pipelines.errors import DeviceError, Refused
+from pipelines.errors import DeviceError, Disconnected, Refused, Unanswered
 
 
 async def greet(
@@ -40,9 +40,8 @@ async def greet(
     try:
         await own.connect()
         await ask()
-    except Refused:
-        raise
-    except DeviceError as error:
+    except (Unanswered, Disconnected) as error:
+        # Other faults are none of a server that serves another client.
         if shared is None:
             raise
         own.close()

@@ -188,6 +188,27 @@ def test_devices_behind_a_server_of_one_client_share_a_connection(newest):
     assert "serves one client" in lines.pop().peculiarities[0]
 
 
+def test_a_fault_that_no_server_of_one_client_makes_is_raised_and_not_passed_over():
+    async def run():
+        async with serving() as (_, port):
+            devices = [device_on(port, unit) for unit in (1, 2)]
+            await greet(devices[0], [], lambda: devices[0].read(5, 1))
+            own = devices[1].line
+
+            async def answers_nonsense_once():
+                if devices[1].line is own:
+                    raise DeviceError("nonsense")
+
+            try:
+                await greet(devices[1], devices[:1], answers_nonsense_once)
+            finally:
+                for device in devices:
+                    device.line.close()
+
+    with pytest.raises(DeviceError, match="nonsense"):
+        asyncio.run(run())
+
+
 def test_a_silent_device_is_not_helped_by_the_connection_of_another():
     async def run():
         async with serving("silent") as (_, silent), serving() as (_, port):
