@@ -6,22 +6,42 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import typer
 
 from exoid_cli.console import console
-from exoid_cli.experiment_folder import open_experiment, settings_in_force
+from exoid_cli.experiment_folder import (
+    in_experiment_folder,
+    open_experiment,
+    settings_in_force,
+)
 from exoid_cli.options import AgainOption, ConfigOption, output_option
+from exoid_cli.separate import Question, question_of, show_separation
 from exoid_cli.stage_runner import run_stages
 
 if TYPE_CHECKING:
+    from pipelines.design.excitation import Design
     from pipelines.design.quality import Quality
+    from pipelines.mechanics.trajectory import Trajectory
 
 
 def design(
     context: typer.Context,
+    causes: Annotated[
+        list[str] | None,
+        typer.Argument(metavar="[CAUSE]...", help="With --separate: effect@joint, two or more."),
+    ] = None,
     output: Annotated[
         Path | None, output_option("The trajectory/1 file to write.", "trajectory.parquet")
     ] = None,
     config: ConfigOption = None,
     evaluate: Annotated[
         Path | None, typer.Option(metavar="FILE", help="Judge this excitation, Parquet or TOML.")
+    ] = None,
+    separate: Annotated[
+        bool, typer.Option("--separate", help="Separate the given causes best.")
+    ] = False,
+    verdict: Annotated[
+        Path | None,
+        typer.Option(
+            "--from", metavar="DIR", help="Separate the causes that a diagnosis leaves open."
+        ),
     ] = None,
     criterion: Annotated[
         Literal["log_det", "condition", "scaled_condition"] | None,
@@ -40,6 +60,8 @@ def design(
       exoid design
       exoid design --config exoid.toml -o trajectory.parquet
       exoid design --evaluate trajectory.toml
+      exoid design --separate parallel_spring@knee rotor_inertia@knee -o next.parquet
+      exoid design --from diagnosed -o next.parquet
     """
     from pipelines.errors import InputError
     from pipelines.mechanics.geometry import Geometry
@@ -48,6 +70,17 @@ def design(
     if evaluate and output:
         raise InputError(
             "--evaluate and -o exclude each other: a judged excitation is not written; drop one"
+        )
+    if bool(causes) != separate or (separate and verdict):
+        raise InputError(
+            "expected causes after --separate, or --from DIR that names them, one of the two; as in"
+            " `exoid design --separate parallel_spring@knee rotor_inertia@knee -o next.parquet`"
+        )
+    decides = separate or verdict is not None
+    if decides and not evaluate and not output:
+        raise InputError(
+            "-o: missing; an excitation that separates causes is no step of the experiment, so name"
+            " its file"
         )
     if not evaluate and not output:
         folder = open_experiment(config, problem="neither -o FILE nor --evaluate FILE is given")
@@ -60,20 +93,82 @@ def design(
     settings = experiment.design.changed(criterion=criterion, harmonics=harmonics, seed=seed)
     experiment.mechanism.refuse_all_but_the_leg("`exoid design`")
     geometry = geometry_from(experiment) or Geometry()
+    question = question_of(causes or (), verdict, experiment, settings) if decides else None
     if evaluate:
-        _evaluate(evaluate, settings, geometry)
+        _evaluate(evaluate, settings, geometry, question)
+    elif output and question:
+        last = _last_excitation(config, settings, geometry)
+        _separate(output, question, geometry, last, experiment.sections("mechanism"))
     elif output:
         _design(output, settings, geometry, experiment.sections("mechanism"))
 
 
-def _evaluate(file: Path, settings: Any, geometry: Any) -> None:
+def _evaluate(file: Path, settings: Any, geometry: Any, question: "Question | None") -> None:
     from pipelines.design.quality import quality
     from pipelines.mechanics.trajectory import read_trajectory
 
-    result = quality(read_trajectory(file), settings, geometry)
-    console.emit({"file": str(file), **result.as_metadata()})
+    trajectory = read_trajectory(file)
+    result, document = quality(trajectory, settings, geometry), {}
+    if question:
+        from pipelines.investigation.rivals import sized
+        from pipelines.investigation.separation import Separation
+
+        rivals, runs = question
+        problem = runs.problem(trajectory, rivals)
+        found = Separation.of(sized(rivals, problem), problem)
+        document = {"separation": found.as_json()}
+    console.emit({"file": str(file), **result.as_metadata(), **document})
     _show(str(file), result)
+    if question:
+        show_separation(f"With {file}", found)
     console.say(f"\n{file}: {settings.criterion} {result.value(settings.criterion):.4g}")
+
+
+def _last_excitation(config: Path | None, settings: Any, geometry: Any) -> "tuple[str, Trajectory]":
+    """Return the experiment's excitation, else the one that its settings give, and its name."""
+    from pipelines.design.excitation import design
+    from pipelines.mechanics.trajectory import read_trajectory
+
+    if config is not None or in_experiment_folder():
+        file = open_experiment(config).step("design").target
+        if file.is_file():
+            return str(file), read_trajectory(file)
+    return f"the excitation of {settings.criterion}", design(settings, geometry).trajectory
+
+
+def _separate(
+    output: Path,
+    question: "Question",
+    geometry: Any,
+    last: "tuple[str, Trajectory]",
+    mechanism: dict[str, Any],
+) -> None:
+    from pipelines.contracts import TRAJECTORY, describe
+    from pipelines.investigation.separating_design import separating_design
+
+    rivals, runs = question
+    with console.progress("designing", total=1.0) as report:
+        result = separating_design(rivals, runs, geometry, last[1], report)
+    settings = {"design": runs.settings.model_dump(mode="json"), "geometry": vars(geometry)}
+    metadata = result.metadata() | describe(config=settings | mechanism)
+    TRAJECTORY.write(output, result.design.frame(), metadata)
+    _warn_of_cut(result.design)
+    console.emit({"file": str(output), **result.metadata()})
+    _show(str(output), result.design.quality)
+    show_separation(f"With {last[0]}", result.before)
+    show_separation("With this one", result.separation)
+    console.say(
+        f"\n{output}: expected log odds of the worst pair {result.separation.least():.3g};"
+        f" stopped by {result.design.stopped_by}"
+    )
+
+
+def _warn_of_cut(design: "Design") -> None:
+    if design.stopped_by == "seconds":
+        console.warn(
+            f"the search was cut short after {design.settings.seconds:g} s, so a faster computer"
+            " may find another design; raise design.seconds"
+        )
 
 
 def _design(output: Path, settings: Any, geometry: Any, mechanism: dict[str, Any]) -> None:
@@ -84,11 +179,7 @@ def _design(output: Path, settings: Any, geometry: Any, mechanism: dict[str, Any
         result = design(settings, geometry, report)
     config = {"design": settings.model_dump(mode="json"), "geometry": vars(geometry)} | mechanism
     TRAJECTORY.write(output, result.frame(), result.metadata() | describe(config=config))
-    if result.stopped_by == "seconds":
-        console.warn(
-            f"the search was cut short after {settings.seconds:g} s, so a faster computer may find"
-            " another design; raise design.seconds"
-        )
+    _warn_of_cut(result)
     console.emit({"file": str(output), **result.metadata()})
     _show(str(output), result.quality)
     console.say(

@@ -95,7 +95,11 @@ def _planned(
     files: Sequence[Path], experiment: Any, rig: Path | None, runs: str, power: float, report: Any
 ) -> list:
     from pipelines.diagnosis.detectability.detectability import detectability
-    from pipelines.diagnosis.detectability.planned_runs import planned_motions, planned_noise
+    from pipelines.diagnosis.detectability.planned_runs import (
+        planned_motions,
+        planned_noise,
+        usual_plant,
+    )
     from pipelines.diagnosis.evidence.baseline import baseline_of
     from pipelines.diagnosis.evidence.eligibility import refuse_unfit
     from pipelines.diagnosis.evidence.known_effects import known_effects
@@ -104,7 +108,9 @@ def _planned(
     from pipelines.mechanics.trajectory import read_trajectory
     from pipelines.settings.rig import load_rig
 
-    plant = load_rig(rig).plant if rig else _default_plant(experiment)
+    if not rig:
+        experiment.mechanism.refuse_all_but_the_leg("`exoid detect` of an excitation")
+    plant = load_rig(rig).plant if rig else usual_plant(experiment.mechanism)
     if plant is None:
         raise InputError(
             f"{rig}: has no [plant], expected the file of a virtual rig; name one that has, or"
@@ -122,14 +128,6 @@ def _planned(
     noise = planned_noise(design.noise, design.sample_rate_hz, observed[0].block)
     known = known_effects(experiment.diagnose.known, motions[0].machine)
     return detectability(observed, baseline_of(observed, known), noise, power, report)
-
-
-def _default_plant(experiment: Any) -> Any:
-    """Return the virtual rig's leg with exoid.toml's lengths."""
-    from pipelines.settings.rig.plant import PlantSettings
-
-    experiment.mechanism.refuse_all_but_the_leg("`exoid detect` of an excitation")
-    return PlantSettings(**experiment.mechanism.geometry)
 
 
 def _recorded(files: Sequence[Path], experiment: Any, power: float, report: Any) -> list:

@@ -2,7 +2,11 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 
+import numpy as np
+
+from pipelines.contracts.verdict import read
 from pipelines.diagnosis.detectability.detection_problem import DetectionProblem
 from pipelines.diagnosis.detectability.planned_runs import planned_motions, planned_noise
 from pipelines.diagnosis.evidence.baseline import baseline_of
@@ -10,7 +14,7 @@ from pipelines.diagnosis.evidence.block_rate import at_block_rate
 from pipelines.diagnosis.evidence.known_effects import known_effects
 from pipelines.diagnosis.evidence.observed_run import observe
 from pipelines.effects.effect import Family
-from pipelines.investigation.rivals import Rival, refuse_hidden
+from pipelines.investigation.rivals import Rival
 from pipelines.mechanics.trajectory import Trajectory
 from pipelines.settings.design import DesignSettings
 from pipelines.settings.rig.plant import PlantSettings
@@ -26,6 +30,20 @@ class PlannedRuns:
     kinds: tuple[str, ...] = ("exo_alone", "with_human")
     known: tuple[str, ...] = ()
     """Labels of effects that the machine is known to have."""
+    noise_nm: tuple[float, float] | None = None
+    """Noise behind the regression filter as it was measured; by default that of the settings."""
+
+    def as_in_verdict(self, folder: Path) -> "PlannedRuns":
+        """Return runs of the kinds, and with the noise, of a diagnosis.
+
+        Raises
+        ------
+        ContractError
+            Where its verdict is damaged.
+        """
+        verdict = read(folder / "verdict.json")
+        noise = verdict.noise_floor_nm
+        return replace(self, kinds=tuple(verdict.runs), noise_nm=(noise["hip"], noise["knee"]))
 
     def problem(self, trajectory: Trajectory, rivals: Sequence[Rival]) -> DetectionProblem:
         """Return the detection problem of the runs.
@@ -38,11 +56,6 @@ class PlannedRuns:
             Of hip and knee.
         rivals : sequence of Rival
             Those that the runs are to separate.
-
-        Raises
-        ------
-        InputError
-            Where no run can show a rival.
         """
         noise, rate_hz = self.settings.noise, self.settings.sample_rate_hz
         period_s, repeats = trajectory.period_s, 1.0
@@ -50,11 +63,11 @@ class PlannedRuns:
             repeats = noise.duration_s / period_s
             noise = noise.model_copy(update={"duration_s": period_s})
         motions = planned_motions(trajectory, self.plant, noise, self.kinds, rate_hz)
-        refuse_hidden(rivals, motions)
         observed = [observe(motion) for motion in motions]
         baseline = baseline_of(observed, known_effects(self.known, motions[0].machine))
         floor = planned_noise(noise, rate_hz, observed[0].block)
-        floor = replace(floor, independent_share=repeats * floor.independent_share)
+        rms = floor.rms if self.noise_nm is None else np.array([*self.noise_nm, np.nan, np.nan])
+        floor = replace(floor, rms=rms, independent_share=repeats * floor.independent_share)
         return DetectionProblem.of([at_block_rate(run) for run in observed], baseline, floor)
 
 

@@ -1,18 +1,22 @@
 """Rival causes: those between which an experiment is to decide."""
 
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
+from pipelines.contracts.verdict import read
+from pipelines.diagnosis.candidates.candidate import Candidate
 from pipelines.diagnosis.candidates.columns import torque_columns
+from pipelines.diagnosis.criteria import CRITERIA
 from pipelines.diagnosis.detectability.detection_problem import DetectionProblem
 from pipelines.diagnosis.detectability.directions import bend, direction_of, orthonormal
 from pipelines.diagnosis.detectability.shapes import shapes_of
 from pipelines.effects import Effect
 from pipelines.errors import InputError
 from pipelines.mechanics.machine import Machine
-from pipelines.mechanics.motion import Motion
 from pipelines.model import BASELINE
 from pipelines.wording.label import effect_at
 
@@ -21,13 +25,15 @@ SETTING = "--separate"
 
 @dataclass(frozen=True)
 class Rival:
-    """A cause, and how probable and how large it is before the experiment."""
+    """A cause, how probable it is before the experiment, and what a diagnosis fitted."""
 
     effect: Effect
     probability: float
     """Of the rivals together one."""
-    size: float
-    """Of its first amplitude, in that unit; a shape that transforms the motion has its own size."""
+    size: float | None = None
+    """Fitted first amplitude, in its unit."""
+    shape: tuple[float, ...] | None = None
+    """Fitted shape."""
 
     @property
     def label(self) -> str:
@@ -36,17 +42,42 @@ class Rival:
 
 
 @dataclass(frozen=True)
+class SizedRival:
+    """A rival with the shapes and amplitudes that it may have."""
+
+    rival: Rival
+    truths: tuple[tuple[Candidate, float], ...]
+    """Shapes and amplitudes that are equally probable if it is the true cause. The amplitude is 1
+    at the size of a shape that transforms the motion."""
+    shapes: tuple[Candidate, ...]
+    """All shapes with which it could explain another cause."""
+
+
+@dataclass(frozen=True)
 class Appearance:
     """How a rival of one shape looks in the rows of a detection problem."""
 
-    torque: np.ndarray
-    """(rows,) at its size, without what the baseline explains, in units of the noise."""
-    span: np.ndarray
+    torque: NDArray
+    """(rows,) at amplitude 1, without what the baseline explains, in units of the noise."""
+    span: NDArray
     """(rows, k) orthonormal: all that its amplitudes can explain."""
 
+    @classmethod
+    def of(cls, candidate: Candidate, problem: DetectionProblem) -> "Appearance":
+        """Compute it for a rival's shape in planned or recorded runs."""
+        runs = problem.runs
+        if candidate.transforms_motion:
+            torque = problem.remainder(bend(candidate, problem))
+            return cls(torque[:, 0], orthonormal(torque))
+        columns = [torque_columns(candidate, r, run) for r, run in enumerate(runs)]
+        own = candidate.columns_in([run.motion.run for run in runs])
+        span = problem.remainder([own.expand(column, r) for r, column in enumerate(columns)])
+        unit = problem.remainder(direction_of(candidate.effect, columns, problem))
+        return cls(unit[:, 0], orthonormal(span))
 
-def rivals_of(labels: Sequence[str], machine: Machine) -> list[Rival]:
-    """Return equally probable rivals of a usual size.
+
+def rivals_named(labels: Sequence[str], machine: Machine) -> list[Rival]:
+    """Return equally probable rivals.
 
     Parameters
     ----------
@@ -65,57 +96,126 @@ def rivals_of(labels: Sequence[str], machine: Machine) -> list[Rival]:
             f"{SETTING}: found {', '.join(labels) or 'no cause'}, expected two different causes or"
             " more, such as parallel_spring@knee rotor_inertia@knee"
         )
-    effects = [
-        effect_at(label, machine, lambda one: one.name not in BASELINE, SETTING) for label in labels
-    ]
-    return [Rival(effect, 1.0 / len(effects), usual_size(effect)) for effect in effects]
+    effects = [effect_at(label, machine, _is_cause, SETTING) for label in labels]
+    return [Rival(effect, 1.0 / len(effects)) for effect in effects]
 
 
-def usual_size(effect: Effect) -> float:
-    """Return the middle of the typical range of an effect's first amplitude; 1 without one."""
-    if not effect.linear:
-        return 1.0
-    low, high = np.sort(np.abs(effect.linear[0].typical))
-    # A range of both signs, or from zero on, has no smallest size.
-    return float(
-        0.5 * high if low == 0.0 or effect.linear[0].typical[0] < 0.0 else np.sqrt(low * high)
-    )
+def rivals_in_verdict(folder: Path, machine: Machine) -> list[Rival]:
+    """Return the causes between which a diagnosis did not decide, with its probabilities.
 
-
-def refuse_hidden(rivals: Sequence[Rival], motions: Sequence[Motion]) -> None:
-    """Refuse rivals that no planned run can show.
+    Parameters
+    ----------
+    folder : Path
+        What ``exoid diagnose`` wrote.
+    machine : Machine
+        That was diagnosed.
 
     Raises
     ------
     InputError
-        Names the first one.
+        Where it leaves no choice of causes.
+    ContractError
+        Where the verdict is damaged.
     """
-    for rival in rivals:
-        if not rival.effect.shows_in(motions):
-            runs = ", ".join(motion.run for motion in motions)
-            raise InputError(
-                f"{SETTING}: {rival.label} cannot show in planned runs ({runs}), which have no cuff"
-                " forces and no temperatures; leave it out"
-            )
+    verdict = read(folder / "verdict.json")
+    choices = ([one for one in f.causes if not one.dropped] for f in verdict.findings)
+    open_ones = next((causes for causes in choices if len(causes) > 1), None)
+    if open_ones is None:
+        raise InputError(
+            f"{folder}: its verdict leaves no choice of causes, which a motion could decide; name"
+            f" causes with {SETTING}"
+        )
+    total = sum(one.probability for one in open_ones)
+    # Values that differ from run to run are no value of the next one.
+    fitted = {
+        cause.label: {p.name: p.value for p in cause.parameters}
+        for cause in verdict.causes
+        if not cause.per_run
+    }
+    return [
+        _with_fitted(
+            Rival(effect_at(one.label, machine, _is_cause, str(folder)), one.probability / total),
+            fitted.get(one.label, {}),
+        )
+        for one in open_ones
+    ]
 
 
-def appearances(rival: Rival, problem: DetectionProblem) -> Iterator[Appearance]:
-    """Yield how a rival looks at each of the shapes that stand for all it may have.
+def _with_fitted(rival: Rival, values: dict[str, float]) -> Rival:
+    """Return a rival with its fitted values, if there are any."""
+    if not values:
+        return rival
+    effect = rival.effect
+    size = abs(values[effect.linear[0].name]) if effect.linear else None
+    shape = tuple(values[p.name] for p in effect.shape) if effect.shape else None
+    return replace(rival, size=size, shape=shape)
+
+
+def _is_cause(effect: type[Effect]) -> bool:
+    return effect.name not in BASELINE
+
+
+def sized(rivals: Sequence[Rival], problem: DetectionProblem) -> list[SizedRival]:
+    """Return rivals with the shapes and amplitudes that agree with what is known.
+
+    Runs that did not separate causes showed one torque, which each of them would have made. Where
+    a diagnosis fitted none, it is a usual share of the joint's torque.
 
     Parameters
     ----------
-    rival : Rival
+    rivals : sequence of Rival
     problem : DetectionProblem
-        Planned or recorded runs.
+        Runs with the last excitation, or a usual one.
+
+    Raises
+    ------
+    InputError
+        Where such runs cannot show a rival.
     """
-    runs = problem.runs
-    for candidate in shapes_of(rival.effect, runs):
-        if candidate.transforms_motion:
-            torque = problem.remainder(bend(candidate, problem))
-            yield Appearance(torque[:, 0], orthonormal(torque))
-            continue
+    motions = [run.motion for run in problem.runs]
+    for rival in rivals:
+        if not rival.effect.shows_in(motions):
+            raise InputError(
+                f"{SETTING}: {rival.label} cannot show in planned runs, which have no"
+                " temperatures; leave it out"
+            )
+    fitted = next((_fitted(rival, problem) for rival in rivals if _is_fitted(rival)), None)
+    return [_sized(rival, problem, fitted) for rival in rivals]
+
+
+def _is_fitted(rival: Rival) -> bool:
+    return rival.size is not None or rival.shape is not None
+
+
+def _fitted(rival: Rival, problem: DetectionProblem) -> float:
+    """Return the length of a fitted rival's torque in the rows of a problem."""
+    candidate = Candidate(rival.effect, (rival.shape or (),) * len(problem.runs))
+    torque = Appearance.of(candidate, problem).torque
+    return (1.0 if rival.size is None else rival.size) * float(np.linalg.norm(torque))
+
+
+def _sized(rival: Rival, problem: DetectionProblem, fitted: float | None) -> SizedRival:
+    grid = list(shapes_of(rival.effect, problem.runs))
+    own = grid
+    if rival.shape is not None:
+        own = [Candidate(rival.effect, (rival.shape,) * len(problem.runs))]
+        grid = [*own, *grid]
+    truths = ((candidate, _amplitude(candidate, problem, fitted)) for candidate in own)
+    # A shape that these runs do not show has no amplitude.
+    return SizedRival(rival, tuple(one for one in truths if np.isfinite(one[1])), tuple(grid))
+
+
+def _amplitude(candidate: Candidate, problem: DetectionProblem, fitted: float | None) -> float:
+    """Return the amplitude at which a candidate makes the fitted torque, or a usual one."""
+    effect, runs = candidate.effect, problem.runs
+    if fitted is not None:
+        length = float(np.linalg.norm(Appearance.of(candidate, problem).torque))
+        return fitted / length if length > 0.0 else np.inf
+    if candidate.transforms_motion:
+        direction = bend(candidate, problem)
+    else:
         columns = [torque_columns(candidate, r, run) for r, run in enumerate(runs)]
-        own = candidate.columns_in([run.motion.run for run in runs])
-        span = problem.remainder([own.expand(column, r) for r, column in enumerate(columns)])
-        unit = problem.remainder(direction_of(rival.effect, columns, problem))
-        yield Appearance(rival.size * unit[:, 0], orthonormal(span))
+        direction = direction_of(effect, columns, problem)
+    share = float(np.mean(CRITERIA.amplitudes))
+    rms = problem.rms(effect, direction)
+    return share * float(problem.torque_rms[problem.joint(effect)]) / rms if rms > 0.0 else np.inf

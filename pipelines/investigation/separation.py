@@ -11,16 +11,20 @@ the logarithm of the independent samples. As in a diagnosis, no form is exact: a
 divided by one plus the model error times what causes explain.
 """
 
+import itertools
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.special import logsumexp
 
 from pipelines.diagnosis.criteria import CRITERIA
+from pipelines.diagnosis.detectability.detectability import NEVER_APART
 from pipelines.diagnosis.detectability.detection_problem import DetectionProblem
-from pipelines.investigation.rivals import Appearance, Rival, appearances
+from pipelines.diagnosis.detectability.directions import orthonormal
+from pipelines.investigation.rivals import Appearance, SizedRival
 
 DECIDED = 0.95
 """Posterior probability of one rival from which the others are excluded."""
@@ -30,17 +34,33 @@ DECIDED = 0.95
 class Separation:
     """How well some runs separate R rivals."""
 
-    rivals: tuple[Rival, ...]
+    rivals: tuple[SizedRival, ...]
+    truths: tuple[tuple[Appearance, ...], ...]
+    """Each rival as the true cause, at its probable shapes."""
     shapes: tuple[tuple[Appearance, ...], ...]
-    """Of each rival."""
+    """Each rival at all shapes with which it could explain another one."""
     price: float
     """Log likelihood that each amplitude costs."""
 
     @classmethod
-    def of(cls, rivals: Sequence[Rival], problem: DetectionProblem) -> "Separation":
+    def of(cls, rivals: Sequence[SizedRival], problem: DetectionProblem) -> "Separation":
         """Compute how the rivals look in a detection problem's rows."""
-        shapes = tuple(tuple(appearances(rival, problem)) for rival in rivals)
-        return cls(tuple(rivals), shapes, 0.5 * float(np.log(problem.independent)))
+        truths = tuple(
+            tuple(
+                replace(one := Appearance.of(candidate, problem), torque=amplitude * one.torque)
+                for candidate, amplitude in sized.truths
+            )
+            for sized in rivals
+        )
+        shapes = tuple(
+            tuple(Appearance.of(one, problem) for one in sized.shapes) for sized in rivals
+        )
+        return cls(tuple(rivals), truths, shapes, 0.5 * float(np.log(problem.independent)))
+
+    @property
+    def labels(self) -> list[str]:
+        """Of the rivals, ``effect@joint``."""
+        return [sized.rival.label for sized in self.rivals]
 
     def log_odds(self) -> NDArray:
         """Return the expected log odds (R, R) of each truth against each rival, priors apart.
@@ -48,7 +68,7 @@ class Separation:
         The mean over the truth's shapes; of the rival, the shape counts that is most alike.
         """
         odds = np.zeros((len(self.rivals), len(self.rivals)))
-        for i, of_truth in enumerate(self.shapes):
+        for i, of_truth in enumerate(self.truths):
             for j, of_rival in enumerate(self.shapes):
                 if i != j:
                     odds[i, j] = np.mean([self._against(one, of_rival) for one in of_truth])
@@ -58,6 +78,36 @@ class Separation:
         """Return the least of the expected log odds: the worst pair counts."""
         odds = self.log_odds()
         return float(np.min(odds[~np.eye(len(odds), dtype=bool)]))
+
+    def inseparable(self) -> list[tuple[str, str]]:
+        """Return the pairs of rivals of which each explains nearly all of the other's torque."""
+        pairs = itertools.combinations(range(len(self.rivals)), 2)
+        return [
+            (self.labels[i], self.labels[j])
+            for i, j in pairs
+            if max(self._share(i, j), self._share(j, i)) < NEVER_APART
+        ]
+
+    def _share(self, i: int, j: int) -> float:
+        """Return the largest share of a truth's power that a rival does not explain."""
+        return max(
+            min(1.0 - _squared(rival.span.T @ truth.torque) / power for rival in self.shapes[j])
+            for truth in self.truths[i]
+            if (power := _squared(truth.torque)) > 0.0
+        )
+
+    def as_json(self) -> dict[str, Any]:
+        """Return the rivals, the expected log odds, and the posterior to expect."""
+        posterior = self.posterior()
+        return {
+            "rivals": [
+                {"cause": sized.rival.label, "probability": sized.rival.probability}
+                for sized in self.rivals
+            ],
+            "expected_log_odds": self.log_odds().tolist(),
+            "expected_posterior": posterior.mean(axis=1).tolist(),
+            "decided": [float(np.mean(of[:, i] >= DECIDED)) for i, of in enumerate(posterior)],
+        }
 
     def _against(self, truth: Appearance, rivals: Sequence[Appearance]) -> float:
         """Return the expected log odds of a truth against the rival shape that is most alike."""
@@ -87,12 +137,12 @@ class Separation:
         rng = np.random.default_rng(seed)
         flat = [shape for own in self.shapes for shape in own]
         # Only the part of the rows that some rival can explain distinguishes them.
-        basis, _ = np.linalg.qr(np.hstack([shape.span for shape in flat]))
+        basis = orthonormal(np.hstack([shape.span for shape in flat]))
         spans = [[basis.T @ shape.span for shape in own] for own in self.shapes]
-        prior = np.log([rival.probability for rival in self.rivals])
+        prior = np.log([sized.rival.probability for sized in self.rivals])
         prices = np.array([self.price * own[0].shape[1] for own in spans])
         result = np.zeros((len(self.rivals), draws, len(self.rivals)))
-        for i, own in enumerate(self.shapes):
+        for i, own in enumerate(self.truths):
             torques = np.array([basis.T @ shape.torque for shape in own])
             y = torques[np.arange(draws) % len(own)] + rng.standard_normal((draws, basis.shape[1]))
             # Power that each shape of each rival explains, (shapes, draws).

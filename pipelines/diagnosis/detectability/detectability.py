@@ -51,6 +51,9 @@ from pipelines.effects import Effect, Parameter
 from pipelines.mechanics.motion import Motion
 from pipelines.mechanics.scale import on_one_scale
 
+NEVER_APART = 1e-3
+"""Share of an effect's power that another does not explain, below which no size separates them."""
+
 
 @dataclass(frozen=True)
 class Detectable:
@@ -382,8 +385,6 @@ def _detectable(
         (share, label) for share, label in others if label != effect.label and _alike(result, share)
     ]
     names = [p.name for p in effect.shape] if result.shape else []
-    # Share of an effect that another does not explain, below which no size separates the two.
-    never = 1e-3
     return Detectable(
         effect,
         result.rms,
@@ -392,7 +393,7 @@ def _detectable(
         min(other.rms for other in results[effect]),
         result.by,
         tuple(label for _, label in alike),
-        tuple(label for share, label in alike if share < never),
+        tuple(label for share, label in alike if share < NEVER_APART),
         torque_rms,
     )
 

@@ -9,8 +9,14 @@ from pipelines.mechanics.mechanisms.leg import LEG
 from pipelines.mechanics.motion import Motion
 from pipelines.mechanics.trajectory import Trajectory
 from pipelines.settings.design import NoiseSettings
+from pipelines.settings.mechanism import MechanismSettings
 from pipelines.settings.rig.plant import PlantSettings
 from pipelines.signals.blocks import BlockAverage
+
+
+def usual_plant(mechanism: MechanismSettings) -> PlantSettings:
+    """Return the virtual rig's leg with the lengths of an experiment."""
+    return PlantSettings(**mechanism.geometry)
 
 
 def planned_motions(
