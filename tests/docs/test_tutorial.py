@@ -23,7 +23,7 @@ SHORT = {
     "exoid.toml": {
         "iterations = 800 ": "iterations = 50 ",
         "base_frequency_hz = 0.1 ": "base_frequency_hz = 0.2 ",
-        "duration_s = 40.0\n": "duration_s = 15.0\n",
+        "duration_s = 40.0\n": "duration_s = 10.0\n",
         "\nsample_rate_hz = 200.0\n": "\nsample_rate_hz = 100.0\n",
         "figures = true": "figures = false",
         "sweep_nm_s_rad = [50.0, 100.0, 150.0, 200.0, 250.0, 300.0, 350.0, 400.0, 450.0, 500.0]": (
