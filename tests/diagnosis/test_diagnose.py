@@ -61,11 +61,12 @@ def test_the_floor_is_the_noise_that_was_put_in(faultless):
             "mass_off_axis", "knee", {"mass_moment": 0.15}, "mass_moment", marks=pytest.mark.slow
         ),
         pytest.param("torque_gain", "hip", {"gain": 1.08}, "gain", marks=pytest.mark.slow),
-        (
+        pytest.param(
             "voluntary_torque",
             "hip",
             {"amplitude": 2.2, "frequency": 0.43, "phase": 0.4},
             "frequency",
+            marks=pytest.mark.slow,
         ),
     ],
 )
