@@ -467,7 +467,7 @@ OTHER_UNIT = (
     ],
     ids=["silent for others", "with exceptions for others", "in the name of unit 1"],
 )
-@pytest.mark.parametrize("units", [(1, 2), (2, 3)], ids=str)
+@pytest.mark.parametrize("units", [(1, 2), pytest.param((2, 3), marks=pytest.mark.slow)], ids=str)
 def test_a_gateway_that_answers_as_unit_1_alone_is_never_advised_for_two_devices(
     tmp_path, answers_as, expected, units
 ):

@@ -105,6 +105,7 @@ def shorten(folder, changes):
         (folder / name).write_text(text, encoding="utf-8")
 
 
+@pytest.mark.slow
 def test_every_command_of_the_tutorial_runs(exoid, monkeypatch, tmp_path):
     monkeypatch.chdir(tmp_path)
     done = dict(do_all(exoid, monkeypatch, SHORT))

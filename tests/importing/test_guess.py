@@ -691,7 +691,15 @@ SIGNED = {
 
 
 @pytest.mark.parametrize(
-    "unsigned", [[name] for name in SIGNED] + [[*SIGNED]], ids=lambda names: "+".join(names)
+    "unsigned",
+    [
+        [*SIGNED],
+        *(
+            pytest.param([name], marks=pytest.mark.slow if name != "iq_mA" else ())
+            for name in SIGNED
+        ),
+    ],
+    ids=lambda names: "+".join(names),
 )
 def test_a_sign_that_was_lost_is_found_again_whatever_lost_it(
     imported, guessed, pendulum, write_csv, unsigned
