@@ -99,6 +99,7 @@ def test_zeros_that_differ_only_in_the_validation_runs_are_each_run_s_own():
     )
 
 
+@pytest.mark.slow
 def test_one_offset_in_all_runs_is_one_and_no_run_has_another():
     outcome = verdict(diagnose([zeroed(m, 0.06) for m in session(seconds=20.0)]))
     (cause,) = outcome["causes"]

@@ -110,14 +110,13 @@ def set_at_each_start(outcome):
     return [caveat for caveat in outcome["caveats"] if "set at each start" in caveat]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("spoil", "offsets", "names"),
     [
         (misread, (1.1, -0.8), {"torque_offset", "torque_drift"}),
-        pytest.param(
-            misread, (0.0, 1.2), {"torque_offset", "torque_drift"}, marks=pytest.mark.slow
-        ),
-        pytest.param(zeroed, (0.07, -0.06), {"encoder_offset"}, marks=pytest.mark.slow),
+        (misread, (0.0, 1.2), {"torque_offset", "torque_drift"}),
+        (zeroed, (0.07, -0.06), {"encoder_offset"}),
     ],
     ids=["tared", "validation run only", "zeroed"],
 )

@@ -114,7 +114,13 @@ def test_the_motion_shows_a_shift_of_the_elbow_and_no_spring_there(plain):
     assert not np.isfinite(found["parallel_spring@elbow"])
 
 
-@pytest.mark.parametrize("counts", [0.0, COUNT], ids=["still", "flickering encoder"])
+@pytest.mark.parametrize(
+    "counts",
+    [
+        pytest.param(0.0, id="still"),
+        pytest.param(COUNT, id="flickering encoder", marks=pytest.mark.slow),
+    ],
+)
 def test_nothing_is_missing_of_a_knee_below_a_hip_that_rests_at_another_angle_in_each_run(counts):
     found = diagnose(braked(counts=counts))
     assert found.status == "nothing_missing"
@@ -151,6 +157,7 @@ def test_cuffs_show_the_whole_leg_of_the_wearer_without_the_hip_s_torque():
     assert np.all(np.abs(own["value"] - of_wearer) < 2.0 * own["std_error"])
 
 
+@pytest.mark.slow
 def test_a_shifted_encoder_of_the_knee_shows_in_the_hip_s_torque_alone():
     runs = leg_without_torque_of("knee", "encoder_offset", "knee", offset=0.05)
     outcome = verdict(diagnose(runs))
