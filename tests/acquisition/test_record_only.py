@@ -27,6 +27,8 @@ from pipelines.settings.rig import load_rig
 from pipelines.settings.rig.recording_only import load_recording_rig
 from tests.acquisition.conftest import free_port
 
+pytestmark = pytest.mark.long
+
 RIG = """\
 name = "bench"
 recording_only = true

@@ -46,7 +46,9 @@ DIAGNOSES = {
     "unknown": lambda: diagnose(
         [humming(m) for m in session(seed=7, seconds=40.0) if m.run == "exo_alone"]
     ),
-    "spoilt": lambda: diagnose([replace(m, torque=m.torque * [1.0, -1.0]) for m in session()]),
+    "spoilt": lambda: diagnose(
+        [replace(m, torque=m.torque * [1.0, -1.0]) for m in session(seed=8)]
+    ),
     "nothing": lambda: sessions.diagnosed(seconds=40.0),
 }
 NAMED = dict.fromkeys(("explained", "one kind, no periods"), "parallel_spring@knee")

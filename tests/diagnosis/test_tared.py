@@ -27,15 +27,14 @@ def misread(motion, offset, rate=0.0):
     return replace(motion, torque=motion.torque + more[:, np.newaxis] * np.array([0.0, 1.0]))
 
 
-def verdict_of(offsets, rate=0.0, seed=1):
-    return verdict(
-        diagnose([misread(m, offsets[m.file], rate) for m in session(seconds=30.0, seed=seed)])
-    )
+def verdict_of(offsets, rate=0.0, seed=1, seconds=30.0):
+    runs = session(seconds=seconds, seed=seed)
+    return verdict(diagnose([misread(m, offsets[m.file], rate) for m in runs]))
 
 
 @pytest.fixture(scope="module")
 def tared():
-    return verdict_of(HIDDEN)
+    return verdict_of(HIDDEN, seconds=20.0)
 
 
 def test_a_sensor_tared_at_each_start_is_named_and_only_a_drift_that_hardly_grows_ties(

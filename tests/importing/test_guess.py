@@ -16,6 +16,8 @@ from pipelines.importing.guess.counting import lost_sign
 from pipelines.importing.guess.names import meaning
 from pipelines.importing.quantities.consistency import integral_agreement
 
+pytestmark = pytest.mark.long
+
 
 @pytest.fixture
 def guessed(tmp_path, capsys):

@@ -16,6 +16,8 @@ from tests.report.sessions import (
     write_verdict,
 )
 
+pytestmark = pytest.mark.long
+
 DRAWN = """key => exoid.plots.get(key).map(u => {
     const all = u.ctx.getImageData(0, 0, u.ctx.canvas.width, u.ctx.canvas.height).data;
     const colours = new Set();

@@ -11,6 +11,8 @@ from pipelines.acquisition.check.probe import Series
 from pipelines.modbus.register_block import Block
 from pipelines.settings.rig import Register
 
+pytestmark = pytest.mark.long
+
 SENSOR_READ = "[map.sensor.force.read]\n"
 
 

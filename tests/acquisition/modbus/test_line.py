@@ -29,6 +29,8 @@ from pipelines.settings.rig.line import RtuLine, RtuOverTcpLine
 from pipelines.settings.rig.safety import SafetySettings
 from tests.acquisition.conftest import free_port
 
+pytestmark = pytest.mark.long
+
 TRANSPORTS = ("tcp", "rtu", "rtu_over_tcp", "tls")
 
 
