@@ -128,6 +128,7 @@ def test_nothing_is_missing_of_a_knee_below_a_hip_that_rests_at_another_angle_in
     assert list(found.parameters["name"]) == ["X2", "X3", "coulomb", "viscous"]
 
 
+@pytest.mark.slow
 def test_the_flicker_of_a_held_joint_s_encoder_is_no_rotor_inertia_of_the_other():
     """With the hip's noise in its columns, the links' inertia would fit worse than a rotor's."""
     found = diagnose(braked(cutoff_hz=12.5, counts=COUNT))

@@ -13,8 +13,6 @@ from pathlib import Path
 
 import pytest
 
-pytestmark = pytest.mark.long
-
 PAGE = Path(__file__).parents[2] / "docs" / "tutorial.md"
 BLOCK = re.compile(r"^```(console|toml)\n(.*?)^```", flags=re.MULTILINE | re.DOTALL)
 NUMBER = re.compile(r"[-+]?\d[\d,]*\.?\d*(?:e[-+]?\d+)?")
@@ -103,6 +101,28 @@ def shorten(folder, changes):
             assert old in text
             text = text.replace(old, new)
         (folder / name).write_text(text, encoding="utf-8")
+
+
+GROUPS = ("rig", "settings")
+"""Commands that have commands."""
+
+
+def test_the_commands_options_and_settings_of_the_tutorial_exist(exoid, monkeypatch, tmp_path):
+    monkeypatch.chdir(tmp_path)
+    for step in steps():
+        if isinstance(step, Edit):
+            step.make()
+            continue
+        program, *words = shlex.split(step.line)
+        if program == "cd":
+            monkeypatch.chdir(Path(words[0]))
+        elif words[0] == "init":
+            assert exoid(*words).code == 0
+        else:
+            shown = exoid(*words[: 2 if words[0] in GROUPS else 1], "--help")
+            assert shown.code == 0, shown.err
+            options = [word for word in words if word.startswith("-")]
+            assert [option for option in options if option not in shown.out] == [], step.line
 
 
 @pytest.mark.slow
