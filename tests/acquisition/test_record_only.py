@@ -13,7 +13,6 @@ import time
 import numpy as np
 import pytest
 
-from pipelines.acquisition.check import survey
 from pipelines.acquisition.check.absent import explain_absence
 from pipelines.acquisition.check.check import check_rig
 from pipelines.acquisition.check.probe import Probe
@@ -52,18 +51,13 @@ angle = {{ address = 104, type = "int32", scale = 1e-6, unit = "rad" }}
 current = {{ address = 108, type = "int32", scale = 0.1, unit = "mA" }}
 [safety]
 watchdog_s = {watchdog_s}
+connect_s = 0.5
 """
 CLOCK = """\
 sequence = { address = 100, type = "uint32" }
 time = { address = 102, type = "uint32", unit = "us" }
 """
 REAL = {"[plant]\n": "[plant]\nsample_rate_hz = 40.0\n"}
-
-
-@pytest.fixture(autouse=True)
-def soon_checked(monkeypatch):
-    """Let the check read all devices together for half its time."""
-    monkeypatch.setattr(survey, "TOGETHER_S", 1.0)
 
 
 @pytest.fixture

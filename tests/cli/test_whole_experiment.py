@@ -93,6 +93,7 @@ def test_a_new_experiment_finds_the_truth_of_a_rig_that_hides_nothing(created, e
     assert (half[body] < 0.15 * middle[body] + 0.02).all()
 
 
+@pytest.mark.slow
 def test_make_does_nothing_twice_and_after_a_change_only_what_depends_on_it(experiment):
     before = written(experiment)
     output, stages = make(experiment)
@@ -143,6 +144,7 @@ def test_a_file_that_a_stage_lacks_is_named_and_made_again(exoid, experiment):
     assert {one["state"] for one in json.loads(exoid("status", "--json").out)} == {"done"}
 
 
+@pytest.mark.slow
 def test_make_makes_a_file_again_that_is_lost(experiment):
     (experiment / "simulated" / "kv-sweep.csv").unlink()
     assert make(experiment)[1] == ["simulate", "report"]
