@@ -136,9 +136,7 @@ def test_two_causes_that_overlap_share_what_either_would_take():
 @pytest.mark.parametrize(
     "name",
     [
-        pytest.param(
-            name, marks=() if name in ("explained", "unknown", "spoilt") else pytest.mark.slow
-        )
+        pytest.param(name, marks=() if name in ("explained", "spoilt") else pytest.mark.slow)
         for name in DIAGNOSES
     ],
 )

@@ -92,7 +92,8 @@ def test_no_friction_is_an_excess_over_one_that_gives_energy(kind):
     assert outcome["residual"]["depends_on"][0]["variable"] == "speed"
 
 
-@pytest.mark.parametrize("kind", ["revolute", pytest.param("prismatic", marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", ["revolute", "prismatic"])
 def test_a_bearing_that_is_rough_on_one_side_is_no_play(kind):
     outcome = verdict_of(kind, rough_on_one_side)
     assert [cause["effect"] for cause in outcome["causes"]] == ["position_dependent_friction"]

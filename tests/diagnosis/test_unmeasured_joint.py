@@ -75,7 +75,7 @@ def test_of_the_elbow_alone_follow_the_parameters_of_its_own_equation(tables):
     assert np.allclose(table["value"], [*TRUTH[1:3], *TRUTH[5:]], rtol=0.03)
 
 
-@pytest.mark.parametrize("joint", ["shoulder", "elbow"])
+@pytest.mark.parametrize("joint", [pytest.param("shoulder", marks=pytest.mark.slow), "elbow"])
 def test_nothing_is_missing_of_it_whichever_torque_was_not_recorded(tables, joint):
     found = diagnose(without_torque_of(joint, tables))
     assert found.status == "nothing_missing"
