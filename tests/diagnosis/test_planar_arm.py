@@ -57,6 +57,7 @@ def test_nothing_is_missing_of_it(arm):
     assert diagnose(arm).status == "nothing_missing"
 
 
+@pytest.mark.slow
 def test_a_spring_at_its_elbow_is_named_with_its_size():
     outcome = verdict(diagnose(motions(spring=6.0)))
     (cause,) = outcome["causes"]

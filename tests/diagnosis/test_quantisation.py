@@ -110,6 +110,7 @@ def test_a_torque_in_coarse_steps_is_something_in_the_sensor(seen):
     assert outcome["posterior"]["laws"][LABEL] > 0.95
 
 
+@pytest.mark.slow
 def test_steps_that_the_noise_covers_are_nothing():
     """1.5 N·m are within those that are sought; noise of 3 N·m is seven times what their rounding
     adds."""
