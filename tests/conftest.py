@@ -1,5 +1,6 @@
 """What holds for every test, and the command line for those that use it."""
 
+import gc
 import os
 import shutil
 import signal
@@ -31,6 +32,12 @@ def pytest_configure(config):
 def pytest_collection_modifyitems(items):
     """Begin with the files that take long, so that both workers end at about the same time."""
     items.sort(key=lambda item: item.get_closest_marker("long") is None)
+
+
+def pytest_collection_finish():
+    """Leave thousands of collected tests out of what each collection of garbage looks through."""
+    gc.collect()
+    gc.freeze()
 
 
 def pytest_unconfigure(config):

@@ -19,12 +19,13 @@ SHORT_WORDS = {
     [
         ({WRITE: f"{WRITE}function = 16\n"}, {3, 16}),
         ({WRITE: f"{WRITE}function = 6\n", **SHORT_WORDS}, {3, 6}),
-        (
+        pytest.param(
             {
                 READ: f"{READ}\nfunction = 4\nmost_words = 8",
                 WRITE: f"{WRITE}function = 16\n",
             },
             {4, 16},
+            marks=pytest.mark.slow,
         ),
     ],
     ids=["FC16 and FC03", "FC06 for each register", "FC04 of 8 registers, FC16"],

@@ -277,7 +277,7 @@ def test_a_killed_run_loses_no_more_than_half_a_second(start, experiment, tmp_pa
     process = start(arguments)
     wait_for_rows(process, output, 1)
     began = time.monotonic()
-    time.sleep(2.0)
+    time.sleep(1.0)
     process.kill()
     killed = time.monotonic()
     process.communicate()
@@ -340,7 +340,7 @@ def test_when_the_host_is_killed_the_drives_stop_the_leg_and_disable_themselves(
         output,
     ]
     acquiring = start(arguments)
-    wait_for_rows(acquiring, output, 100)
+    wait_for_rows(acquiring, output, 50)
     with ModbusTcpClient("127.0.0.1", port=port) as client:
         assert [status_of(client, unit)[1] for unit in (1, 2)] == [0x0001] * 2
         acquiring.kill()

@@ -29,6 +29,8 @@ from pipelines.settings.rig import Register, load_rig
 from pipelines.settings.rig.recording_only import load_recording_rig
 from tests.acquisition.conftest import free_port
 
+pytestmark = pytest.mark.long
+
 RIG = """\
 name = "bench"
 recording_only = true
@@ -52,6 +54,7 @@ angle = {{ address = 104, type = "int32", scale = 1e-6, unit = "rad" }}
 current = {{ address = 108, type = "int32", scale = 0.1, unit = "mA" }}
 [safety]
 watchdog_s = {watchdog_s}
+connect_s = 0.5
 """
 CLOCK = """\
 sequence = { address = 100, type = "uint32" }
@@ -476,7 +479,7 @@ OTHER_UNIT = (
     ],
     ids=["silent for others", "with exceptions for others", "in the name of unit 1"],
 )
-@pytest.mark.parametrize("units", [(1, 2), (2, 3)], ids=str)
+@pytest.mark.parametrize("units", [(1, 2), pytest.param((2, 3), marks=pytest.mark.slow)], ids=str)
 def test_a_gateway_that_answers_as_unit_1_alone_is_never_advised_for_two_devices(
     tmp_path, answers_as, expected, units
 ):

@@ -139,7 +139,9 @@ def test_the_settings_know_every_method():
 
 
 def test_output_fits_eighty_columns(exoid, recordings, tmp_path):
-    outcome = exoid("identify", *sorted(recordings.iterdir()), "-o", tmp_path)
+    (tmp_path / "exoid.toml").write_text("[identify]\nfigures = false\n")
+    given = ("-o", tmp_path, "--config", tmp_path / "exoid.toml")
+    outcome = exoid("identify", *sorted(recordings.iterdir()), *given)
     assert max(map(len, outcome.out.splitlines())) <= 80
 
 
@@ -215,7 +217,9 @@ def test_what_is_no_parquet_file_ends_in_one_line(exoid, tmp_path, command, cont
 
 
 def test_parameters_are_no_motion(exoid, recordings, tmp_path):
-    assert exoid("identify", *sorted(recordings.iterdir()), "-o", tmp_path).code == 0
+    (tmp_path / "exoid.toml").write_text("[identify]\nfigures = false\n")
+    given = ("-o", tmp_path, "--config", tmp_path / "exoid.toml")
+    assert exoid("identify", *sorted(recordings.iterdir()), *given).code == 0
     outcome = exoid("identify", tmp_path / "parameters.parquet", "-o", tmp_path / "again")
     assert outcome.code == 2
     assert "holds parameters/1, expected motion/1" in outcome.err

@@ -1,10 +1,12 @@
 """From a log without one joint's torque to the report; what needs every torque says so."""
 
 import json
+import shutil
 
 import numpy as np
 import pytest
 
+from exoid_cli.app import run
 from pipelines.contracts import PARAMETERS, RECORDING, RESIDUALS
 
 pytest.importorskip("mujoco")
@@ -44,20 +46,30 @@ period_s = {PERIOD_S}
 """
 
 
-@pytest.fixture
-def folder(tmp_path, monkeypatch, exoid):
-    """An experiment of two imported logs, with a spring at the shoulder."""
+@pytest.fixture(scope="module")
+def imported(tmp_path_factory):
+    """Two imported logs, with a spring at the shoulder."""
+    folder = tmp_path_factory.mktemp("imported") / "experiment"
+    folder.mkdir()
     for purpose, seed in (("train", 1), ("validate", 2)):
         frame = planar_arm(purpose, seed).frame
         # A spring changes the torque that this motion takes, and nothing else.
         frame["shoulder_torque_nm"] += 6.0 * (frame["shoulder_angle_rad"] - 0.2)
-        frame.drop(columns="elbow_torque_nm").to_csv(tmp_path / f"{purpose}.csv", index=False)
-    (tmp_path / "map.toml").write_text(MAP, encoding="utf-8")
-    (tmp_path / "exoid.toml").touch()
-    monkeypatch.chdir(tmp_path)
-    outcome = exoid("import", "train.csv", "validate.csv", "--map", "map.toml")
-    assert outcome.code == 0, outcome.err
-    return tmp_path
+        frame.drop(columns="elbow_torque_nm").to_csv(folder / f"{purpose}.csv", index=False)
+    (folder / "map.toml").write_text(MAP, encoding="utf-8")
+    (folder / "exoid.toml").touch()
+    logs = [str(folder / f"{purpose}.csv") for purpose in ("train", "validate")]
+    given = ["--map", str(folder / "map.toml"), "-o", str(folder / "recordings")]
+    assert run(["import", *logs, *given]) == 0
+    return folder
+
+
+@pytest.fixture
+def folder(imported, tmp_path, monkeypatch):
+    """The current folder: an experiment of them."""
+    copied = shutil.copytree(imported, tmp_path / "experiment")
+    monkeypatch.chdir(copied)
+    return copied
 
 
 def test_every_stage_that_needs_no_simulation_runs(exoid, folder):

@@ -23,7 +23,7 @@ CHANGES = {
     "base_frequency_hz = 0.1 ": "base_frequency_hz = 0.2 ",
     "harmonics = 5\n": "harmonics = 3\n",
     'rig = "rigs/default.toml"': 'rig = "rigs/plain.toml"',
-    "duration_s = 40.0\n": "duration_s = 15.0\n",
+    "duration_s = 40.0\n": "duration_s = 10.0\n",
     "\nsample_rate_hz = 200.0\n": "\nsample_rate_hz = 100.0\n",
     "figures = true": "figures = false",
     "150.0, 200.0, 250.0, 300.0, 350.0, 400.0, 450.0, 500.0]": "150.0]",
@@ -93,6 +93,7 @@ def test_a_new_experiment_finds_the_truth_of_a_rig_that_hides_nothing(created, e
     assert (half[body] < 0.15 * middle[body] + 0.02).all()
 
 
+@pytest.mark.slow
 def test_make_does_nothing_twice_and_after_a_change_only_what_depends_on_it(experiment):
     before = written(experiment)
     output, stages = make(experiment)
@@ -141,7 +142,10 @@ def test_a_file_that_a_stage_lacks_is_named_and_made_again(exoid, experiment):
     assert again == ["identify", "simulate", "replay", "report"]
     assert all((experiment / name).is_file() for name in lost)
     assert {one["state"] for one in json.loads(exoid("status", "--json").out)} == {"done"}
-    make(experiment)  # which goes by times, and does more
+
+
+@pytest.mark.slow
+def test_make_makes_a_file_again_that_is_lost(experiment):
     (experiment / "simulated" / "kv-sweep.csv").unlink()
     assert make(experiment)[1] == ["simulate", "report"]
     assert make(experiment)[1] == []

@@ -11,9 +11,7 @@ BUMPER = {"stiffness": 12.0, "contact_angle": -0.75, "exponent": 1.75}
 
 @pytest.mark.parametrize("seed", [1, pytest.param(2, marks=pytest.mark.slow)])
 def test_intervals_hold_a_truth_between_two_forms_and_are_not_wide_open(seed):
-    outcome = verdict(
-        diagnose(session("end_stop", "knee", seed=seed, seconds=30.0, direction=1.0, **BUMPER))
-    )
+    outcome = verdict(diagnose(session("end_stop", "knee", seed=seed, direction=1.0, **BUMPER)))
     (cause,) = outcome["causes"]
     assert (cause["effect"], cause["joint"]) == ("end_stop", "knee")
     intervals = {parameter["name"]: parameter["ci95"] for parameter in cause["parameters"]}

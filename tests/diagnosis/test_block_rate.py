@@ -14,7 +14,7 @@ from tests.diagnosis.sessions import session
 
 @pytest.fixture(scope="module")
 def look():
-    return Screening.of(session(seconds=20.0))
+    return Screening.of(session())
 
 
 @pytest.fixture(scope="module")

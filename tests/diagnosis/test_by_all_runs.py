@@ -35,23 +35,27 @@ def diagnosis():
     return diagnosed("quadratic_drag", "hip", seed=7, seconds=40.0, trained=POOR, drag=6.0)
 
 
-def test_a_drag_that_slow_training_runs_do_not_show_is_named_by_all_runs(diagnosis):
-    outcome = verdict(diagnosis)
+@pytest.fixture(scope="module")
+def outcome(diagnosis):
+    return verdict(diagnosis)
+
+
+def test_a_drag_that_slow_training_runs_do_not_show_is_named_by_all_runs(outcome):
     assert outcome["sought_on"] == "all"
     assert ("quadratic_drag", "hip") in labels(outcome["causes"][0])
     assert any("the training runs alone name no cause" in caveat for caveat in outcome["caveats"])
 
 
-def test_the_residual_is_split_by_the_runs_that_were_searched(diagnosis):
+def test_the_residual_is_split_by_the_runs_that_were_searched(diagnosis, outcome):
     """In the slow training runs all of it is noise."""
     prepared = prepare(diagnosis.data.train, diagnosis.baseline)
     alone = residual_shares(prepared.runs, prepared.residuals, prepared.noise)[0]
-    shares = verdict(diagnosis)["router"]["hip"]
+    shares = outcome["router"]["hip"]
     assert shares["repeats"] > 0.04 > alone.repeats
 
 
-def test_its_amplitudes_are_fitted_to_the_training_runs_alone(diagnosis):
-    assert verdict(diagnosis)["fitted_to"] == "train"
+def test_its_amplitudes_are_fitted_to_the_training_runs_alone(diagnosis, outcome):
+    assert outcome["fitted_to"] == "train"
     prepared = prepare(diagnosis.data.train, diagnosis.baseline)
     refine = Refinement(prepared.runs, diagnosis.baseline, prepared.weights)
     by_training = refine(diagnosis.after.fit.causes)
@@ -72,9 +76,7 @@ def test_where_nothing_is_missing_all_runs_show_nothing_either():
 @pytest.fixture(scope="module")
 def cross_validated():
     """A drag on training runs so slow that its torque there is lost in the noise."""
-    return diagnose(
-        session("quadratic_drag", "hip", seed=7, seconds=40.0, trained=SLOWEST, drag=6.0)
-    )
+    return diagnose(session("quadratic_drag", "hip", seed=7, trained=SLOWEST, drag=6.0))
 
 
 def test_a_cause_whose_size_no_training_run_shows_is_cross_validated(cross_validated):
@@ -92,8 +94,15 @@ def test_a_cause_whose_size_no_training_run_shows_is_cross_validated(cross_valid
     )
 
 
-@pytest.mark.parametrize("half", [0, 1])
-@pytest.mark.parametrize("label", [("load_dependent_friction", "hip"), ("backlash", "hip")])
+@pytest.mark.parametrize(
+    ("label", "half"),
+    [
+        (("load_dependent_friction", "hip"), 0),
+        (("backlash", "hip"), 1),
+        pytest.param(("load_dependent_friction", "hip"), 1, marks=pytest.mark.slow),
+        pytest.param(("backlash", "hip"), 0, marks=pytest.mark.slow),
+    ],
+)
 def test_each_half_is_predicted_by_a_fit_that_has_not_seen_it(cross_validated, label, half):
     """Torque that one half alone has changes the prediction of the other half, and not of it, with
     a cause that needs a load and with a transmission too."""
@@ -162,9 +171,7 @@ def test_where_cross_validation_fails_no_cause_is_named(monkeypatch):
     monkeypatch.setattr(
         JudgedFit, "predicts_better_than", lambda self, *_: bool(tried.append(self.scheme))
     )
-    outcome = verdict(
-        diagnose(session("quadratic_drag", "hip", seed=7, seconds=40.0, trained=SLOWEST, drag=6.0))
-    )
+    outcome = verdict(diagnose(session("quadratic_drag", "hip", seed=7, trained=SLOWEST, drag=6.0)))
     assert isinstance(tried[-1], CrossValidation)
     assert (outcome["status"], outcome["causes"]) == ("unknown_cause", [])
     assert (outcome["sought_on"], outcome["fitted_to"]) == ("all", "train")

@@ -230,7 +230,7 @@ def test_what_columns_explain_is_weighed_with_a_prior_share():
 def test_a_tenth_of_the_residual_counts_as_noise(monkeypatch):
     monkeypatch.setattr(module_of_library, "_effects", lambda prepared: [])
     monkeypatch.setattr(module_of_library, "_ripples", lambda *_: [])
-    prepared = Screening.of(session(seconds=20.0)).prepared
+    prepared = Screening.of(session()).prepared
     regression = module_of_library.build_library(prepared).regression
     noise, _ = prepared.noise.averaged(LENGTH_S)
     for root, band in zip(regression.roots, regression.bands, strict=True):

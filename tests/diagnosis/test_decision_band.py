@@ -14,7 +14,7 @@ from tests.diagnosis.sessions import session
 
 @pytest.fixture(scope="module")
 def prepared():
-    runs = [observe(motion) for motion in session(seconds=30.0) if motion.purpose == "train"]
+    runs = [observe(motion) for motion in session() if motion.purpose == "train"]
     return prepare(runs, baseline_of(runs))
 
 

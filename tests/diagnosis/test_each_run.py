@@ -40,7 +40,7 @@ def zeroed(motion, offset):
 
 @pytest.fixture(scope="module")
 def diagnosis():
-    return diagnose([zeroed(m, HIDDEN[m.file]) for m in session(seconds=30.0)])
+    return diagnose([zeroed(m, HIDDEN[m.file]) for m in session()])
 
 
 @pytest.fixture(scope="module")
@@ -87,7 +87,7 @@ def test_zeros_that_differ_only_in_the_validation_runs_are_each_run_s_own():
         "run_2.parquet": 0.058,
         "run_3.parquet": -0.06,
     }
-    outcome = verdict(diagnose([zeroed(m, hidden[m.file]) for m in session(seconds=30.0)]))
+    outcome = verdict(diagnose([zeroed(m, hidden[m.file]) for m in session()]))
     (cause,) = outcome["causes"]
     assert (cause["effect"], cause["joint"], cause["fitted_on_validate"]) == (
         "encoder_offset",
@@ -99,8 +99,9 @@ def test_zeros_that_differ_only_in_the_validation_runs_are_each_run_s_own():
     )
 
 
+@pytest.mark.slow
 def test_one_offset_in_all_runs_is_one_and_no_run_has_another():
-    outcome = verdict(diagnose([zeroed(m, 0.06) for m in session(seconds=30.0)]))
+    outcome = verdict(diagnose([zeroed(m, 0.06) for m in session()]))
     (cause,) = outcome["causes"]
     assert (cause["effect"], cause["joint"]) == ("encoder_offset", "knee")
     assert cause["fitted_on_validate"] == cause["each_run"] == []

@@ -58,7 +58,13 @@ PEAK = "a Stribeck peak of probability 0.50 is named with a drag of another expo
 
 @pytest.mark.parametrize(
     "kind",
-    ["revolute", pytest.param("prismatic", marks=pytest.mark.xfail(strict=True, reason=PEAK))],
+    [
+        "revolute",
+        pytest.param(
+            "prismatic",
+            marks=[pytest.mark.xfail(strict=True, reason=PEAK), pytest.mark.slow],
+        ),
+    ],
 )
 def test_what_a_cause_of_another_form_leaves_is_reported_with_its_variable(kind):
     outcome = verdict_of(kind, steeper_than_squared)
@@ -86,7 +92,8 @@ def test_no_friction_is_an_excess_over_one_that_gives_energy(kind):
     assert outcome["residual"]["depends_on"][0]["variable"] == "speed"
 
 
-@pytest.mark.parametrize("kind", ["revolute", pytest.param("prismatic", marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", ["revolute", "prismatic"])
 def test_a_bearing_that_is_rough_on_one_side_is_no_play(kind):
     outcome = verdict_of(kind, rough_on_one_side)
     assert [cause["effect"] for cause in outcome["causes"]] == ["position_dependent_friction"]

@@ -58,7 +58,8 @@ def motion(time, angle, torque, purpose):
     )
 
 
-@pytest.mark.parametrize("seed", [1, pytest.param(2, marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", [1, 2])
 def test_ripple_of_several_lines_and_friction_that_builds_up_are_both_named(seed):
     diagnosis = diagnose(level_joint(seed))
     assert {"cogging@joint", "presliding_hysteresis@joint"} <= set(diagnosis.causes)

@@ -11,13 +11,12 @@ from pipelines.model import model_from_parameters
 from tests.diagnosis.sessions import session
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("label", "values"),
     [
         ("rotor_inertia@knee", {"inertia": 0.12}),
-        pytest.param(
-            "parallel_spring@knee", {"stiffness": 6.0, "rest_angle": -0.5}, marks=pytest.mark.slow
-        ),
+        ("parallel_spring@knee", {"stiffness": 6.0, "rest_angle": -0.5}),
     ],
 )
 def test_what_is_known_is_fitted_to_its_truth_and_missed_no_more(label, values):

@@ -53,6 +53,7 @@ def screw():
     return diagnosis, verdict(diagnosis)
 
 
+@pytest.mark.slow
 def test_a_spring_at_a_small_servo_is_named_or_tied_and_fitted_to_its_size():
     diagnosis = diagnose(motions(pendulum, spring=0.8))
     outcome = verdict(diagnosis)

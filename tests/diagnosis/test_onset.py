@@ -127,7 +127,10 @@ def test_a_run_to_which_nothing_was_handed_has_no_value():
     assert low <= high == pytest.approx(SECONDS, abs=0.1)
 
 
-@pytest.mark.parametrize(("kind", "of_all"), [("revolute", 0.3 * HANDED), ("prismatic", 2.0)])
+@pytest.mark.parametrize(
+    ("kind", "of_all"),
+    [("revolute", 0.3 * HANDED), pytest.param("prismatic", 2.0, marks=pytest.mark.slow)],
+)
 def test_a_load_that_is_handed_over_is_named_with_its_size_and_when_in_every_run(kind, of_all):
     """At an arm by its moment in kg·m, at a lift by its mass."""
     hidden = {"train_1.parquet": 11.7, "train_2.parquet": 26.2, "validate_3.parquet": 30.4}

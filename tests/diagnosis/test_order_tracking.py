@@ -99,6 +99,7 @@ def test_a_ripple_is_no_hum_and_both_together_are_both():
     assert dict(both)[Kind.TIME] == pytest.approx(23.0, abs=0.005)
 
 
+@pytest.mark.slow
 def test_noise_of_any_colour_shows_a_line_in_fewer_than_one_session_in_a_hundred():
     rng = np.random.default_rng(4)
     sessions, alarms = 240, Counter()

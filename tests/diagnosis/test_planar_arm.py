@@ -52,8 +52,13 @@ def test_it_moves_as_it_was_recorded(arm, identified):
     assert replay(identified.model_of(arm[1]), arm[1]).rmse.max() < 0.01
 
 
-def test_nothing_is_missing_of_it_and_a_spring_at_its_elbow_is_named_with_its_size(arm):
+@pytest.mark.slow
+def test_nothing_is_missing_of_it(arm):
     assert diagnose(arm).status == "nothing_missing"
+
+
+@pytest.mark.slow
+def test_a_spring_at_its_elbow_is_named_with_its_size():
     outcome = verdict(diagnose(motions(spring=6.0)))
     (cause,) = outcome["causes"]
     assert (cause["effect"], cause["joint"]) == ("parallel_spring", "elbow")

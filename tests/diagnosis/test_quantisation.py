@@ -80,19 +80,27 @@ def test_a_torque_that_hardly_varies_about_its_mean_has_no_step():
     assert coarse_step([torque], [rounding(torque, 5e-6)], 1e-5) is None
 
 
-def test_samples_that_do_not_count_have_no_say():
-    """Spikes in a tenth of a session's samples, all of them marked as invalid."""
+def with_spikes_that_do_not_count(motions):
+    """Return motions with spikes in a tenth of their samples, all of them marked as invalid."""
     spoilt = []
-    for motion in reported_in_steps(4.0, seed=11):
+    for motion in motions:
         torque, valid = motion.torque.copy(), motion.valid.copy()
         bad = np.arange(len(torque)) % 200 < 20
         torque[bad, 0] += 300.0 * np.sign(torque[bad, 0])
         spoilt.append(replace(motion, torque=torque, valid=valid & ~bad))
-    assert verdict(diagnose(spoilt))["posterior"]["laws"].get(LABEL, 0.0) > 0.95
+    return spoilt
 
 
-def test_a_torque_in_coarse_steps_is_something_in_the_sensor():
-    diagnosis = diagnose(reported_in_steps(4.0, seed=11))
+@pytest.mark.parametrize(
+    "seen",
+    [
+        with_spikes_that_do_not_count,
+        pytest.param(lambda motions: motions, marks=pytest.mark.slow),
+    ],
+    ids=["beside samples that do not count", "alone"],
+)
+def test_a_torque_in_coarse_steps_is_something_in_the_sensor(seen):
+    diagnosis = diagnose(seen(reported_in_steps(4.0, seed=11)))
     outcome, first = verdict(diagnosis), candidates(diagnosis).iloc[0]
     assert outcome["status"] == "unknown_cause"
     assert (first["causes"], first["verdict"]) == ([LABEL], "unlisted")
@@ -102,6 +110,7 @@ def test_a_torque_in_coarse_steps_is_something_in_the_sensor():
     assert outcome["posterior"]["laws"][LABEL] > 0.95
 
 
+@pytest.mark.slow
 def test_steps_that_the_noise_covers_are_nothing():
     """1.5 N·m are within those that are sought; noise of 3 N·m is seven times what their rounding
     adds."""

@@ -11,7 +11,7 @@ from pipelines.diagnosis.candidates.smooth_laws import Spans, smooth_laws
 from pipelines.diagnosis.diagnose import diagnose
 from pipelines.diagnosis.verdict.verdict import verdict
 from tests.diagnosis.screening import Screening
-from tests.diagnosis.sessions import banded, session
+from tests.diagnosis.sessions import banded, diagnosed, session
 
 STEP = 1e-5
 LABEL = "law:across_joints"
@@ -67,9 +67,7 @@ def test_a_band_across_both_joints_is_one_unlisted_law_of_no_single_joint():
 
 
 def test_a_spring_of_one_joint_is_none():
-    outcome = verdict(
-        diagnose(session("parallel_spring", "knee", seed=5, stiffness=10.0, rest_angle=-0.9))
-    )
+    outcome = verdict(diagnosed("parallel_spring", "knee", seed=4, stiffness=6.0, rest_angle=-0.5))
     assert outcome["causes"][0]["effect"] == "parallel_spring"
     assert outcome["posterior"]["laws"].get(LABEL, 0.0) < 0.05
 

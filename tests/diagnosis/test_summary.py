@@ -28,6 +28,7 @@ from pipelines.mechanics.motion import motion_from_table
 from pipelines.settings.filter import FilterSettings
 from tests.diagnosis.naming import missing, naming
 from tests.diagnosis.sessions import recordings
+from tests.once import once
 
 LABEL = "parallel_spring@knee"
 SPRING = Cause.model_construct(
@@ -37,9 +38,10 @@ TILT = Tie.model_construct(effect="base_tilt", joint=None)
 STRIBECK = SPRING.model_copy(update={"effect": "stribeck_friction", "joint": "hip"})
 
 
-@pytest.fixture(scope="module")
-def stuck():
-    """A spring at the knee; in one run to validate on the hip's encoder stands for five seconds."""
+@once
+def diagnosed_stuck():
+    """Return a diagnosis of a spring at the knee; in one run to validate on the hip's encoder
+    stands for five seconds."""
     motions = []
     for number, table in enumerate(
         recordings("parallel_spring", "knee", seed=4, seconds=40.0, stiffness=6.0, rest_angle=-0.5)
@@ -49,7 +51,12 @@ def stuck():
             frame.loc[1600:2600, "hip_angle_rad"] = frame.loc[1600, "hip_angle_rad"]
         motion = motion_from_table(motion_table(Table(frame, table.metadata), FilterSettings()))
         motions.append(replace(motion, file=f"run_{number}.parquet"))
-    return naming(diagnose(motions), LABEL)
+    return diagnose(motions)
+
+
+@pytest.fixture(scope="module")
+def stuck():
+    return naming(diagnosed_stuck(), LABEL)
 
 
 def errors(rms):

@@ -27,15 +27,14 @@ def misread(motion, offset, rate=0.0):
     return replace(motion, torque=motion.torque + more[:, np.newaxis] * np.array([0.0, 1.0]))
 
 
-def verdict_of(offsets, rate=0.0, seed=1):
-    return verdict(
-        diagnose([misread(m, offsets[m.file], rate) for m in session(seconds=30.0, seed=seed)])
-    )
+def verdict_of(offsets, rate=0.0, seed=1, seconds=30.0):
+    runs = session(seconds=seconds, seed=seed)
+    return verdict(diagnose([misread(m, offsets[m.file], rate) for m in runs]))
 
 
 @pytest.fixture(scope="module")
 def tared():
-    return verdict_of(HIDDEN)
+    return verdict_of(HIDDEN, seconds=20.0)
 
 
 def test_a_sensor_tared_at_each_start_is_named_and_only_a_drift_that_hardly_grows_ties(
@@ -92,9 +91,8 @@ def test_what_grows_within_runs_is_a_drift_whatever_its_level(levels):
     assert rate["ci95"][0] <= 0.03 <= rate["ci95"][1]
 
 
-@pytest.mark.parametrize(
-    "seed", [2, *(pytest.param(more, marks=pytest.mark.slow) for more in range(3, 20))]
-)
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(2, 20))
 def test_of_a_sensor_that_is_right_nothing_is_named(seed):
     outcome = verdict_of(dict.fromkeys(HIDDEN, 0.0), seed=seed)
     assert outcome["status"] == "nothing_missing" and outcome["causes"] == []
@@ -111,14 +109,13 @@ def set_at_each_start(outcome):
     return [caveat for caveat in outcome["caveats"] if "set at each start" in caveat]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("spoil", "offsets", "names"),
     [
         (misread, (1.1, -0.8), {"torque_offset", "torque_drift"}),
-        pytest.param(
-            misread, (0.0, 1.2), {"torque_offset", "torque_drift"}, marks=pytest.mark.slow
-        ),
-        pytest.param(zeroed, (0.07, -0.06), {"encoder_offset"}, marks=pytest.mark.slow),
+        (misread, (0.0, 1.2), {"torque_offset", "torque_drift"}),
+        (zeroed, (0.07, -0.06), {"encoder_offset"}),
     ],
     ids=["tared", "validation run only", "zeroed"],
 )

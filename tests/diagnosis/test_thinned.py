@@ -17,7 +17,7 @@ RATE_HZ = 1000.0
 def fast():
     """A motion between whose samples four more are put, on the lines that join them; noise is on
     the torque alone."""
-    slow = session(seconds=20.0)[3]
+    slow = session()[3]
     time = np.arange(5 * len(slow)) / RATE_HZ
     at = {
         name: np.column_stack(

@@ -75,7 +75,7 @@ def test_of_the_elbow_alone_follow_the_parameters_of_its_own_equation(tables):
     assert np.allclose(table["value"], [*TRUTH[1:3], *TRUTH[5:]], rtol=0.03)
 
 
-@pytest.mark.parametrize("joint", ["shoulder", "elbow"])
+@pytest.mark.parametrize("joint", [pytest.param("shoulder", marks=pytest.mark.slow), "elbow"])
 def test_nothing_is_missing_of_it_whichever_torque_was_not_recorded(tables, joint):
     found = diagnose(without_torque_of(joint, tables))
     assert found.status == "nothing_missing"
@@ -114,7 +114,13 @@ def test_the_motion_shows_a_shift_of_the_elbow_and_no_spring_there(plain):
     assert not np.isfinite(found["parallel_spring@elbow"])
 
 
-@pytest.mark.parametrize("counts", [0.0, COUNT], ids=["still", "flickering encoder"])
+@pytest.mark.parametrize(
+    "counts",
+    [
+        pytest.param(0.0, id="still"),
+        pytest.param(COUNT, id="flickering encoder", marks=pytest.mark.slow),
+    ],
+)
 def test_nothing_is_missing_of_a_knee_below_a_hip_that_rests_at_another_angle_in_each_run(counts):
     found = diagnose(braked(counts=counts))
     assert found.status == "nothing_missing"
@@ -122,6 +128,7 @@ def test_nothing_is_missing_of_a_knee_below_a_hip_that_rests_at_another_angle_in
     assert list(found.parameters["name"]) == ["X2", "X3", "coulomb", "viscous"]
 
 
+@pytest.mark.slow
 def test_the_flicker_of_a_held_joint_s_encoder_is_no_rotor_inertia_of_the_other():
     """With the hip's noise in its columns, the links' inertia would fit worse than a rotor's."""
     found = diagnose(braked(cutoff_hz=12.5, counts=COUNT))
@@ -151,6 +158,7 @@ def test_cuffs_show_the_whole_leg_of_the_wearer_without_the_hip_s_torque():
     assert np.all(np.abs(own["value"] - of_wearer) < 2.0 * own["std_error"])
 
 
+@pytest.mark.slow
 def test_a_shifted_encoder_of_the_knee_shows_in_the_hip_s_torque_alone():
     runs = leg_without_torque_of("knee", "encoder_offset", "knee", offset=0.05)
     outcome = verdict(diagnose(runs))

@@ -25,7 +25,7 @@ def test_a_stop_resists_on_its_side_by_a_power_of_the_depth(with_human, directio
 
 
 def test_a_stop_is_looked_for_within_the_angles_that_the_runs_sweep():
-    runs = [observe(m) for m in session(seconds=15.0) if m.purpose == "train"]
+    runs = [observe(m) for m in session() if m.purpose == "train"]
     stop = EndStop("knee", on=baseline_of(runs).machine)
     tried = values_in(stop, stop.shape[0], 16, runs)
     knee = np.concatenate([run.state[0][:, 1] for run in runs])

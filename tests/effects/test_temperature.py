@@ -33,7 +33,7 @@ def labels(motions):
 @pytest.fixture(scope="module")
 def warm_and_cold():
     """A session whose second recording was made with the drives 15 °C warmer."""
-    motions = session(seconds=15.0)
+    motions = session()
     warmer = {"run_2.parquet": 15.0}
     return [
         replace(m, temperature=m.interpolated_temperature + warmer.get(m.file, 0.0))

@@ -57,7 +57,9 @@ def test_accelerations_that_take_no_torque_are_noise(shaken):
     ("effect", "values"),
     [
         (None, {}),
-        ("joint_elasticity", {"stiffness": 150.0, "hardening": 0.0}),
+        pytest.param(
+            "joint_elasticity", {"stiffness": 150.0, "hardening": 0.0}, marks=pytest.mark.slow
+        ),
         ("backlash", {"play": 0.03}),
     ],
 )

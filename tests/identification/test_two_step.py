@@ -56,6 +56,7 @@ def test_the_truth_is_recovered_without_noise(noiseless_motions, truth):
     assert_allclose(found.parameters["value"], truth, rtol=0.01, atol=0.005)
 
 
+@pytest.mark.slow
 def test_the_truth_lies_in_the_intervals_95_times_in_100_under_coloured_noise(
     noiseless_motions, truth
 ):

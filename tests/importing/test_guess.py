@@ -16,6 +16,8 @@ from pipelines.importing.guess.counting import lost_sign
 from pipelines.importing.guess.names import meaning
 from pipelines.importing.quantities.consistency import integral_agreement
 
+pytestmark = pytest.mark.long
+
 
 @pytest.fixture
 def guessed(tmp_path, capsys):
@@ -691,7 +693,15 @@ SIGNED = {
 
 
 @pytest.mark.parametrize(
-    "unsigned", [[name] for name in SIGNED] + [[*SIGNED]], ids=lambda names: "+".join(names)
+    "unsigned",
+    [
+        [*SIGNED],
+        *(
+            pytest.param([name], marks=pytest.mark.slow if name != "iq_mA" else ())
+            for name in SIGNED
+        ),
+    ],
+    ids=lambda names: "+".join(names),
 )
 def test_a_sign_that_was_lost_is_found_again_whatever_lost_it(
     imported, guessed, pendulum, write_csv, unsigned

@@ -46,7 +46,7 @@ joints = [{ name = "x", kind = "prismatic" }, { name = "y", kind = "prismatic" }
 LOWER_KG, UPPER_KG, ANGLE = 60.0, 30.0, np.pi / 3
 
 
-def stage(purpose, seed, asymmetry=0.0, seconds=25.0):
+def stage(purpose, seed, asymmetry=0.0, seconds=15.0):
     """Return a recording of two slides at 60°, by Newton's law in the plane for each of the two
     bodies.
 

@@ -18,7 +18,7 @@ KINDS = ("exo_alone", "with_human")
 @pytest.fixture(scope="module")
 def motions():
     """A run without the wearer and one with."""
-    return session(seconds=12.0)[::2]
+    return session()[::2]
 
 
 def model(*terms):

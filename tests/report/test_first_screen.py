@@ -206,8 +206,18 @@ RIGHT_EDGES = """() => {
 }"""
 
 
-@pytest.mark.parametrize("width", [390, 700, 1000, 1280])
-@pytest.mark.parametrize("causes", [1, 2])
+@pytest.mark.parametrize(
+    ("causes", "width"),
+    [
+        pytest.param(
+            causes,
+            width,
+            marks=() if (causes, width) in ((1, 390), (2, 700), (2, 1280)) else pytest.mark.slow,
+        )
+        for causes in (1, 2)
+        for width in (390, 700, 1000, 1280)
+    ],
+)
 def test_no_row_of_tiles_is_left_half_empty(opened, tmp_path, causes, width):
     folder = write_session(tmp_path / "axis", AXIS)
     write_verdict(

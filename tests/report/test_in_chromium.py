@@ -16,6 +16,8 @@ from tests.report.sessions import (
     write_verdict,
 )
 
+pytestmark = pytest.mark.long
+
 DRAWN = """key => exoid.plots.get(key).map(u => {
     const all = u.ctx.getImageData(0, 0, u.ctx.canvas.width, u.ctx.canvas.height).data;
     const colours = new Set();
@@ -31,7 +33,7 @@ def draw_all(page):
     page.wait_for_function("[...exoid.plots.values()].flat().every(u => u.status === 1)")
 
 
-@pytest.mark.parametrize("scheme", ["light", "dark"])
+@pytest.mark.parametrize("scheme", ["light", pytest.param("dark", marks=pytest.mark.slow)])
 def test_the_page_loads_without_a_complaint_and_every_chart_is_drawn(opened, page_file, scheme):
     with opened(page_file, color_scheme=scheme) as page:
         draw_all(page)
@@ -77,7 +79,10 @@ def test_buttons_zoom_without_a_mouse(opened, page_file):
         assert page.evaluate(RANGE, key) == pytest.approx(whole)
 
 
-@pytest.mark.parametrize("width", [360, 390, 768, 1280, 1920])
+@pytest.mark.parametrize(
+    "width",
+    [360, 1920, *(pytest.param(width, marks=pytest.mark.slow) for width in (390, 768, 1280))],
+)
 def test_nothing_sticks_out_of_the_screen(opened, page_file, width):
     with opened(page_file, width=width) as page:
         draw_all(page)
@@ -294,7 +299,7 @@ PRINTED = """async () => {
 far apart, px."""
 
 
-@pytest.mark.parametrize("paper", [695, 718])
+@pytest.mark.parametrize("paper", [695, pytest.param(718, marks=pytest.mark.slow)])
 def test_on_paper_nothing_sticks_out_and_no_axis_outgrows_the_text_or_has_labels_that_meet(
     opened, tmp_path, paper
 ):

@@ -158,7 +158,13 @@ def test_replay_without_a_controller_skips_the_closed_loop_and_says_why(
     assert made.exists() and not (tmp_path / "replay-closed-loop.parquet").exists()
 
 
-@pytest.mark.parametrize("cause", CAUSES.values(), ids=CAUSES)
+@pytest.mark.parametrize(
+    "cause",
+    [
+        pytest.param(cause, id=name, marks=pytest.mark.slow if number % 3 else ())
+        for number, (name, cause) in enumerate(CAUSES.items())
+    ],
+)
 def test_a_model_with_any_cause_is_simulated_and_replayed(
     exoid, parameters_file, recording_file, quick, tmp_path, cause
 ):

@@ -16,6 +16,8 @@ from pipelines.settings import Experiment, datasets
 from pipelines.settings.template import create
 from pipelines.workflow.graph import STAGES, graph
 
+pytestmark = pytest.mark.long
+
 # Settings are split by exoid itself; every other command only writes the file it was asked for.
 STAND_IN = f"""#!/bin/sh
 case "$1" in

@@ -30,7 +30,7 @@ def checked(rig_file, serve, monkeypatch):
         replace = dict(served or {})
         if shipped == "real_time":  # slow, for a busy computer
             replace["[plant]\n"] = f"[plant]\nsample_rate_hz = {real_hz}\n"
-        monkeypatch.setattr(survey, "TOGETHER_S", 1.5 if shipped == "real_time" else 0.3)
+        monkeypatch.setattr(survey, "TOGETHER_S", 1.0 if shipped == "real_time" else 0.3)
         monkeypatch.setattr(survey, "DRIVES_S", 0.1)
         with socket.socket() as probe:
             probe.bind(("127.0.0.1", 0))

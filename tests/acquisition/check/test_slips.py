@@ -11,6 +11,8 @@ from pipelines.acquisition.check.probe import Series
 from pipelines.modbus.register_block import Block
 from pipelines.settings.rig import Register
 
+pytestmark = pytest.mark.long
+
 SENSOR_READ = "[map.sensor.force.read]\n"
 
 
@@ -38,7 +40,11 @@ def moved(by):
 @pytest.mark.parametrize(
     ("by", "words"),
     [
-        (-1, "all of map.sensor.force.read is one address too low: add 1 to each"),
+        pytest.param(
+            -1,
+            "all of map.sensor.force.read is one address too low: add 1 to each",
+            marks=pytest.mark.slow,
+        ),
         (1, "all of map.sensor.force.read is one address too high: subtract 1 from each"),
         (40001, "all of map.sensor.force.read is 40001 too high: subtract it from each"),
     ],

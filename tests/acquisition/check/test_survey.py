@@ -32,8 +32,15 @@ def unrelated_to_speed(report):
     return [text for text in findings if "ms to answer, too long" not in text]
 
 
-@pytest.mark.parametrize("shipped", ["plain", "real_time"])
-@pytest.mark.parametrize("run", ["exo_alone", "with_human"])
+@pytest.mark.parametrize(
+    ("run", "shipped"),
+    [
+        ("exo_alone", "plain"),
+        ("exo_alone", "real_time"),
+        ("with_human", "plain"),
+        pytest.param("with_human", "real_time", marks=pytest.mark.slow),
+    ],
+)
 def test_a_right_rig_has_no_findings(checked, shipped, run):
     report = checked(shipped, options={"run": run})
     assert unrelated_to_speed(report) == []

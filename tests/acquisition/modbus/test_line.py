@@ -29,6 +29,8 @@ from pipelines.settings.rig.line import RtuLine, RtuOverTcpLine
 from pipelines.settings.rig.safety import SafetySettings
 from tests.acquisition.conftest import free_port
 
+pytestmark = pytest.mark.long
+
 TRANSPORTS = ("tcp", "rtu", "rtu_over_tcp", "tls")
 
 
@@ -269,7 +271,7 @@ def test_a_line_lost_in_a_run_stops_it_and_is_reported_once(on_line, line_of, re
             served[0].stop_soon()
 
     with pytest.raises(DeviceError) as caught:
-        record_on(on_line(line_of("rtu")), "exo_alone", pull_the_plug, served)
+        record_on(on_line(line_of("rtu"), watchdog_s=1.0), "exo_alone", pull_the_plug, served)
     assert str(caught.value).count("the line is lost") == 1
     assert str(caught.value).count("no such serial port") == 1
 
@@ -286,7 +288,7 @@ def test_after_a_broken_connection_the_drives_are_disabled_on_a_new_one(
             connection.close()
 
     with pytest.raises(DeviceError, match=r"line leg .* is lost.*; the leg was stopped"):
-        record_on(on_line(line_of("tcp")), "exo_alone", hang_up, served)
+        record_on(on_line(line_of("tcp"), watchdog_s=1.0), "exo_alone", hang_up, served)
     assert served[0].enabled == [False, False]
 
 

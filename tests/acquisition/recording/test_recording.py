@@ -233,7 +233,7 @@ def with_full_queues(rig_file, serve, excitation, monkeypatch):
     """Serve drives in real time whose queues nobody has read since they were switched on; do
     something with them."""
     excitation.write_text(excitation.read_text().replace("6.283185307179586", "1.2566370614359172"))
-    monkeypatch.setattr(ring, "QUEUE_RECORDS", 500)
+    monkeypatch.setattr(ring, "QUEUE_RECORDS", 250)
     # Slow, for a busy computer.
     slow = {
         "record_rate_hz = 1000.0": "record_rate_hz = 200.0",
@@ -262,7 +262,7 @@ def with_full_queues(rig_file, serve, excitation, monkeypatch):
 @pytest.fixture
 def recorded_from_queues(with_full_queues, excitation, tmp_path):
     def run():
-        settings = RunSettings(name="test", run="exo_alone", purpose="train", duration_s=2.0)
+        settings = RunSettings(name="test", run="exo_alone", purpose="train", duration_s=1.0)
         with_full_queues(
             lambda rig: acquire(rig, settings, excitation, tmp_path / "test.parquet", 40.0)
         )
@@ -274,7 +274,7 @@ def recorded_from_queues(with_full_queues, excitation, tmp_path):
 def test_queues_that_are_full_before_the_run_are_emptied_first(recorded_from_queues):
     table = recorded_from_queues()
     assert table.metadata["gaps"] == []
-    assert np.diff(table.frame["sequence"]).tolist() == [1] * 399
+    assert np.diff(table.frame["sequence"]).tolist() == [1] * 199
 
 
 def test_what_comes_to_a_queue_while_the_drives_take_their_time_to_be_enabled_is_let_go(
@@ -285,7 +285,7 @@ def test_what_comes_to_a_queue_while_the_drives_take_their_time_to_be_enabled_is
     def slowly(servo):
         if not enabled(servo):
             return False
-        return time.monotonic() > since.setdefault(servo, time.monotonic()) + 2.3
+        return time.monotonic() > since.setdefault(servo, time.monotonic()) + 1.15
 
     monkeypatch.setattr(Servo, "enabled", property(slowly))
     assert recorded_from_queues().metadata["gaps"] == []

@@ -21,7 +21,7 @@ def test_the_posterior_outruns_a_refit_of_every_pair():
 
 
 def test_a_smaller_catalogue_offers_fewer_shapes():
-    quarter, half = catalogue_rows(recorded(15.0), (8, 4))
+    quarter, half = catalogue_rows(recorded(15.0), (16, 8))
     effects = [int(row.name.split(" effects")[0]) for row in (quarter, half)]
     assert 0 < effects[0] < effects[1]
     shapes = [int(row.name.split(", ")[1].removesuffix(" shapes")) for row in (quarter, half)]

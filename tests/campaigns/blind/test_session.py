@@ -82,7 +82,7 @@ def test_recordings_keep_the_contract(faultless):
     [
         ("stribeck_friction", KNEE),
         ("encoder_offset", HIP),
-        ("backlash", KNEE),
+        pytest.param("backlash", KNEE, marks=pytest.mark.slow),
         pytest.param("torque_drift", KNEE, marks=pytest.mark.slow),
         ("voluntary_torque", HIP),
     ],
