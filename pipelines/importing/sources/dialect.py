@@ -22,6 +22,14 @@ FEWEST = 10
 COMMENTS = ("#", "%", "//")
 BYTE_ORDER_MARKS = {b"\xef\xbb\xbf": "utf-8-sig", b"\xff\xfe": "utf-16", b"\xfe\xff": "utf-16"}
 NOT_A_NUMBER = {"", "nan", "null", "none", "na", "n/a", "inf", "-inf", "-nan", "true", "false"}
+# Marks between thousands only with a decimal point: otherwise they may be decimal ones.
+NUMBER = {
+    decimal: re.compile(
+        rf"[-+]?(\d+({point}\d*)?|{point}\d+|\d{{1,3}}({mark}\d{{3}})+{point}\d+)([eE][-+]?\d+)?"
+    )
+    for decimal, point, mark in ((".", r"\.", ","), (",", ",", r"\."))
+}
+"""A number, by the decimal mark."""
 DATE = re.compile(r"\d{1,4}[-./]\d{1,2}[-./]\d{1,4}[T\s]+\d{1,2}:\d\d(:\d\d)?")
 """Beginning of a date with its time of day."""
 
@@ -327,13 +335,4 @@ def _is_missing(field: str) -> bool:
 
 
 def _is_number(field: str, decimal: str) -> bool:
-    # Marks between thousands only with a decimal point: otherwise they may be decimal ones.
-    point, mark = re.escape(decimal), "," if decimal == "." else r"\."
-    return (
-        re.fullmatch(
-            rf"[-+]?(\d+({point}\d*)?|{point}\d+|\d{{1,3}}({mark}\d{{3}})+{point}\d+)"
-            r"([eE][-+]?\d+)?",
-            field,
-        )
-        is not None
-    )
+    return NUMBER[decimal].fullmatch(field) is not None
