@@ -115,12 +115,12 @@ def _evaluate(file: Path, settings: Any, geometry: Any, question: "Question | No
 
         rivals, runs = question
         problem = runs.problem(trajectory, rivals)
-        found = Separation.of(sized(rivals, problem), problem)
-        document = {"separation": found.as_json()}
+        separated = Separation.of(sized(rivals, problem), problem)
+        document = {"separation": separated.as_json()}
     console.emit({"file": str(file), **result.as_metadata(), **document})
     _show(str(file), result)
     if question:
-        show_separation(f"With {file}", found)
+        show_separation(f"With {file}", separated)
     console.say(f"\n{file}: {settings.criterion} {result.value(settings.criterion):.4g}")
 
 

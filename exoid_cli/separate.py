@@ -35,13 +35,13 @@ def show_separation(title: str, separation: "Separation") -> None:
     """Show the posterior to expect under each truth."""
     from pipelines.investigation.separation import DECIDED
 
-    found = separation.as_json()
-    labels = [one["cause"] for one in found["rivals"]]
+    document = separation.as_json()
+    labels = [one["cause"] for one in document["rivals"]]
     decided = f"decided ({DECIDED:.2f})"
     rows = [
         (label, *(f"{p:.2f}" for p in posterior), f"{share:.0%}")
         for label, posterior, share in zip(
-            labels, found["expected_posterior"], found["decided"], strict=True
+            labels, document["expected_posterior"], document["decided"], strict=True
         )
     ]
     console.say(f"\n{title}, the probability of each cause to expect:")

@@ -112,10 +112,10 @@ def _search(
     def costs_of(candidates: NDArray) -> NDArray:
         nonlocal best_odds
         log_det = -costs(candidates, problem)  # repairs them
-        found = [separation(rivals, runs, trajectory_of(one, problem)) for one in candidates]
-        best_odds = max(best_odds, *(one.least() for one in found))
+        separations = [separation(rivals, runs, trajectory_of(one, problem)) for one in candidates]
+        best_odds = max(best_odds, *(one.least() for one in separations))
         report(done, f"log odds {best_odds:.3g}")
-        return np.array([_cost(*one) for one in zip(found, log_det, strict=True)])
+        return np.array([_cost(*one) for one in zip(separations, log_det, strict=True)])
 
     swarm = first_swarm(settings, problem, spread, rng)
     start = swarm.position[np.argmin(costs_of(swarm.position))]
@@ -139,11 +139,11 @@ def _search(
     return trajectory_of(best, problem), stopped_by
 
 
-def _cost(found: Separation, log_det: float) -> float:
+def _cost(separated: Separation, log_det: float) -> float:
     """Return what the search minimizes."""
     # A pair that no motion changes leaves the search to the others. A tenth of a log odds is worth
     # one of log det.
     of_others, of_parameters = 1e-3, 0.1
-    odds = np.minimum(found.log_odds(), SURELY_DECIDED)
+    odds = np.minimum(separated.log_odds(), SURELY_DECIDED)
     worst = odds[~np.eye(len(odds), dtype=bool)].min()
     return -float(worst + of_others * odds.mean() + of_parameters * log_det)

@@ -7,8 +7,8 @@ of it. The log likelihood of A then exceeds that of B by half of
     |r|² - |Q'r|²
 
 in the mean (T-optimality: Atkinson and Fedorov, 1975, Biometrika 62(1)). Each amplitude costs half
-the logarithm of the independent samples. As in a diagnosis, no form is exact: a log likelihood is
-divided by one plus the model error times what causes explain.
+the logarithm of the independent samples. As in a diagnosis, no form is exact: an output counts less
+where causes explain more of it.
 """
 
 import itertools
@@ -24,6 +24,7 @@ from pipelines.diagnosis.criteria import CRITERIA
 from pipelines.diagnosis.detectability.detectability import NEVER_APART
 from pipelines.diagnosis.detectability.detection_problem import DetectionProblem
 from pipelines.diagnosis.detectability.directions import orthonormal
+from pipelines.diagnosis.selection.marginal_likelihood import power
 from pipelines.investigation.rivals import Appearance, SizedRival
 
 DECIDED = 0.95
@@ -41,21 +42,32 @@ class Separation:
     """Each rival at all shapes with which it could explain another one."""
     price: float
     """Log likelihood that each amplitude costs."""
+    noise: NDArray
+    """(rows,) its standard deviation; below one where the model's error counts."""
 
     @classmethod
     def of(cls, rivals: Sequence[SizedRival], problem: DetectionProblem) -> "Separation":
-        """Compute how the rivals look in a detection problem's rows."""
-        truths = tuple(
-            tuple(
-                replace(one := Appearance.of(candidate, problem), torque=amplitude * one.torque)
-                for candidate, amplitude in sized.truths
-            )
-            for sized in rivals
+        """Compute how the rivals look in a detection problem's rows.
+
+        Parameters
+        ----------
+        rivals : sequence of SizedRival
+        problem : DetectionProblem
+            Planned or recorded runs.
+        """
+        truths = _truths(rivals, problem)
+        # The mean over all truths: the rivals stand for one torque.
+        squares = np.mean([one.torque**2 for own in truths for one in own], axis=0)
+        explained = np.bincount(problem.outputs, squares, minlength=len(problem.root))
+        weights = power(explained, 1.0, CRITERIA.model_error)
+        weighted = problem.weighted(weights)
+        return cls(
+            tuple(rivals),
+            _truths(rivals, weighted),
+            tuple(tuple(Appearance.of(c, weighted) for c in sized.shapes) for sized in rivals),
+            0.5 * float(np.log(problem.independent)),
+            np.sqrt(weights[problem.outputs]),
         )
-        shapes = tuple(
-            tuple(Appearance.of(one, problem) for one in sized.shapes) for sized in rivals
-        )
-        return cls(tuple(rivals), truths, shapes, 0.5 * float(np.log(problem.independent)))
 
     @property
     def labels(self) -> list[str]:
@@ -91,9 +103,9 @@ class Separation:
     def _share(self, i: int, j: int) -> float:
         """Return the largest share of a truth's power that a rival does not explain."""
         return max(
-            min(1.0 - _squared(rival.span.T @ truth.torque) / power for rival in self.shapes[j])
+            min(1.0 - _squared(rival.span.T @ truth.torque) / whole for rival in self.shapes[j])
             for truth in self.truths[i]
-            if (power := _squared(truth.torque)) > 0.0
+            if (whole := _squared(truth.torque)) > 0.0
         )
 
     def as_json(self) -> dict[str, Any]:
@@ -111,10 +123,9 @@ class Separation:
 
     def _against(self, truth: Appearance, rivals: Sequence[Appearance]) -> float:
         """Return the expected log odds of a truth against the rival shape that is most alike."""
-        power = float(truth.torque @ truth.torque)
-        width = truth.span.shape[1]
+        of_truth, width = _squared(truth.torque), truth.span.shape[1]
         return min(
-            0.5 * _tempered(power, power - _squared(rival.span.T @ truth.torque))
+            0.5 * float(of_truth - _squared(rival.span.T @ truth.torque))
             + self.price * (rival.span.shape[1] - width)
             for rival in rivals
         )
@@ -144,14 +155,14 @@ class Separation:
         result = np.zeros((len(self.rivals), draws, len(self.rivals)))
         for i, own in enumerate(self.truths):
             torques = np.array([basis.T @ shape.torque for shape in own])
-            y = torques[np.arange(draws) % len(own)] + rng.standard_normal((draws, basis.shape[1]))
+            noise = rng.standard_normal((draws, len(self.noise))) * self.noise
+            y = torques[np.arange(draws) % len(own)] + noise @ basis
             # Power that each shape of each rival explains, (shapes, draws).
             explained = [np.array([_squared(y @ q) for q in of_rival]) for of_rival in spans]
-            most = np.max([power.max(axis=0) for power in explained], axis=0)
             evidence = np.array(
                 [
-                    logsumexp(0.5 * _tempered(most, power), axis=0) - np.log(len(power))
-                    for power in explained
+                    logsumexp(0.5 * of_rival, axis=0) - np.log(len(of_rival))
+                    for of_rival in explained
                 ]
             )
             log = evidence.T + prior - prices
@@ -164,6 +175,14 @@ def _squared(x: NDArray) -> NDArray:
     return np.sum(x * x, axis=-1)
 
 
-def _tempered(power: NDArray | float, part: NDArray | float) -> NDArray:
-    """Return a part of the power that causes explain, as the model's error lets it count."""
-    return np.asarray(part) / (1.0 + CRITERIA.model_error * np.asarray(power))
+def _truths(
+    rivals: Sequence[SizedRival], problem: DetectionProblem
+) -> tuple[tuple[Appearance, ...], ...]:
+    """Return how each rival looks as the true cause, at each of its probable shapes."""
+    return tuple(
+        tuple(
+            replace(one := Appearance.of(candidate, problem), torque=amplitude * one.torque)
+            for candidate, amplitude in sized.truths
+        )
+        for sized in rivals
+    )

@@ -2,6 +2,7 @@
 
 import json
 
+import numpy as np
 import pytest
 
 from exoid_cli.app import run
@@ -91,3 +92,48 @@ def test_options_win_over_the_file(tmp_path, config):
 def test_a_wrong_call_is_one_line_and_code_2(arguments, message, capsys):
     assert run(["design", *arguments]) == 2
     assert capsys.readouterr().err.startswith(message)
+
+
+PAIR = ("base_tilt", "encoder_offset@knee")
+
+
+def test_an_excitation_that_decides_between_causes_is_written_with_what_to_expect(
+    tmp_path, config, capsys
+):
+    out = tmp_path / "next.parquet"
+    assert run(["design", "--separate", *PAIR, "--config", config, "-o", str(out)]) == 0
+    printed = capsys.readouterr().out
+    for title in ("With the excitation of log_det, the probability", "With this one, the probab"):
+        assert title in printed
+    metadata = TRAJECTORY.read(out).metadata
+    assert metadata["criterion"] == "separation"
+    found = metadata["separation"]
+    assert [one["cause"] for one in found["rivals"]] == list(PAIR)
+    odds = np.array(found["expected_log_odds"])
+    assert metadata["criterion_value"] == pytest.approx(min(odds[0, 1], odds[1, 0]))
+    assert np.array(found["expected_posterior"]).sum(axis=1) == pytest.approx(1.0)
+    # Judged as any other excitation, it separates them as it says.
+    assert run(["design", "--evaluate", str(out), "--separate", *PAIR, "--json"]) == 0
+    judged = json.loads(capsys.readouterr().out)["separation"]
+    assert np.array(judged["expected_posterior"]).shape == (2, 2)
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (["base_tilt"], "expected causes after --separate"),
+        (["--separate", "-o", "next.parquet"], "expected causes after --separate"),
+        (["--separate", *PAIR], "-o: missing"),
+        (["--separate", *PAIR, "--from", "diagnosed"], "one of the two"),
+        (["--separate", "base_tilt", "nonsense", "-o", "n.parquet"], "no effect 'nonsense'"),
+        (["--from", "nowhere", "-o", "n.parquet"], "nowhere"),
+    ],
+)
+def test_a_question_that_no_excitation_answers_ends_in_one_line(
+    options, message, tmp_path, monkeypatch, capsys
+):
+    monkeypatch.chdir(tmp_path)
+    assert run(["design", *options]) == 2
+    said = capsys.readouterr().err
+    assert message in said and len(said.splitlines()) == 1
+    assert not list(tmp_path.glob("*.parquet"))

@@ -64,11 +64,25 @@ class DetectionProblem:
             [(c @ values)[run.valid] for run, c in zip(runs, untouched, strict=True)]
         )
         rms = np.sqrt(np.mean(torque**2, axis=0))
-        problem = cls(loaded, baseline, untouched, values, root, independent, np.zeros((0, 0)), rms)
-        # The basis is made of weighted rows, which the problem itself provides.
-        rows = problem.rows(untouched)
+        nothing = np.zeros((0, 0))
+        return cls(
+            loaded, baseline, untouched, values, root, independent, nothing, rms
+        )._with_basis()
+
+    def weighted(self, weights: NDArray) -> "DetectionProblem":
+        """Return the problem with other weights of the outputs, (O,), as factors."""
+        return replace(self, root=self.root * np.sqrt(weights))._with_basis()
+
+    def _with_basis(self) -> "DetectionProblem":
+        """Return the problem with the basis of its weighted baseline."""
+        rows = self.rows(self.untouched)
         # QR would invent a direction for a column of zeros.
-        return replace(problem, basis=np.linalg.qr(rows[:, rows.any(axis=0)])[0])
+        return replace(self, basis=np.linalg.qr(rows[:, rows.any(axis=0)])[0])
+
+    @property
+    def outputs(self) -> NDArray:
+        """Number of the output of each row, (rows,)."""
+        return np.concatenate([np.nonzero(run.usable)[1] for run in self.runs])
 
     def rows(self, columns: Sequence[NDArray]) -> NDArray:
         """Return columns as weighted rows, usable ones only.

@@ -90,5 +90,5 @@ def unit_vector(x: NDArray) -> NDArray:
 
 
 def squared(x: NDArray) -> float:
-    """Return the sum of squares."""
+    """Return the sum of the squares of all elements, (n,) or more."""
     return float(np.sum(x * x))
