@@ -249,23 +249,24 @@ def _tables(
     """Return the table of each delimiter and decimal point that give one."""
     # A line that begins with the map's own mark is no row, and may hold the header.
     marks = (settings.comment,) if settings.comment else COMMENTS
-    tables = [
-        _table(lines, delimiter, decimal, marks)
-        for delimiter in delimiters
-        # A comma may separate fields and be the decimal point of quoted numbers.
-        for decimal in settings.decimal or ".,"
+    filled = [
+        (k, line)
+        for k, line in enumerate(lines)
+        if line.strip() and not line.lstrip().startswith(marks)
     ]
+    tables = []
+    for delimiter in delimiters:
+        # Without it every line is one field.
+        if any(delimiter in line or (delimiter == " " and "\t" in line) for _, line in filled):
+            rows = [(k, _fields(line, delimiter)) for k, line in filled]
+            # A comma may separate fields and be the decimal point of quoted numbers.
+            tables += [_table(rows, delimiter, one, marks) for one in settings.decimal or ".,"]
     return [table for table in tables if table is not None]
 
 
 def _table(
-    lines: Sequence[str], delimiter: str, decimal: str, marks: tuple[str, ...]
+    rows: Sequence[tuple[int, list[str]]], delimiter: str, decimal: str, marks: tuple[str, ...]
 ) -> _Table | None:
-    rows = [
-        (k, _fields(line, delimiter))
-        for k, line in enumerate(lines)
-        if line.strip() and not line.lstrip().startswith(marks)
-    ]
     data = [fields for _, fields in rows if _are_numbers(fields, decimal)]
     if not data:
         return None
@@ -308,6 +309,8 @@ def _blocks(
 def _fields(line: str, delimiter: str) -> list[str]:
     if delimiter == " ":
         line = line.replace("\t", " ").strip()
+    if '"' not in line:  # of whole files, the reader takes most of the time
+        return [f.strip() for f in (line.split() if delimiter == " " else line.split(delimiter))]
     return [
         field.strip()
         for field in next(csv.reader([line], delimiter=delimiter, skipinitialspace=True), [])
