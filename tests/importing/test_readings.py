@@ -561,3 +561,19 @@ def test_rows_that_are_missing_do_not_hide_that_a_counter_wraps(imported, pendul
     counts = MAP.replace('unit = "rad"', 'unit = "counts", counts_per_turn = 376991', 1)
     outcome = imported(path, map_text=counts)
     assert "set wraps_at = 65536" in outcome.printed, outcome
+
+
+def test_a_torque_without_its_sign_is_named(imported, pendulum, write_csv):
+    """As torque meters log it that write the direction in words."""
+    words = np.where(pendulum.torque < 0.0, "CCW", "CW")
+    columns = pendulum.columns() | {"torque": np.abs(pendulum.torque), "direction": words}
+    outcome = imported(write_csv(columns))
+    assert outcome.code == 0
+    assert "pivot_torque_nm: turns round at 0 as a magnitude does" in outcome.printed
+    assert "its sign is missing" not in imported(write_csv(pendulum.columns())).printed
+
+
+def test_a_torque_of_one_sign_that_only_touches_zero_lacks_none(imported, pendulum, write_csv):
+    """As that of a brake, or of a joint that always carries its load to one side."""
+    columns = pendulum.columns() | {"torque": 1.0 - np.cos(6.0 * pendulum.time)}
+    assert "its sign is missing" not in imported(write_csv(columns)).printed

@@ -15,6 +15,8 @@ from pipelines.mechanics.geometry import Geometry
 from pipelines.mechanics.machine import known_in_words, machine_of, mechanisms_of
 from pipelines.mechanics.remedies import AT_REST
 from pipelines.settings.import_map import ImportMap, JointSettings
+from pipelines.signals.folded import is_folded
+from pipelines.signals.held import new_values
 
 STRONGEST = {"torque": 1e3, "force": 1e5}
 """N·m and N; drives of legs, arms and robots deliver less, so more is mostly in another unit."""
@@ -65,6 +67,7 @@ def check(columns: Mapping[str, NDArray], settings: ImportMap) -> Iterator[Findi
         yield from _turns_on(columns, joint)
         yield from _slips(columns, joint)
         yield from _too_strong(columns, joint)
+        yield from _unsigned(columns, joint)
     joints = [joint.joint for joint in settings.joint]
     # Drives whose torque was not measured may do the work that the others absorb.
     if all(joint.is_measured for joint in joints):
@@ -176,6 +179,16 @@ def _too_strong(columns: Mapping[str, NDArray], joint: JointSettings) -> Iterato
             seen,
             f"kept; check its unit (is it m{unit}?), scale, gear_ratio and torque constant",
         )
+
+
+def _unsigned(columns: Mapping[str, NDArray], joint: JointSettings) -> Iterator[Finding]:
+    """Report a torque without its sign, which may stand in another column."""
+    for quantity in _torque_of(joint):
+        name = joint.joint.column(quantity)
+        if is_folded(columns[name][new_values(columns[name])]):
+            seen = "turns round at 0 as a magnitude does, so its sign is missing"
+            action = "kept; where another column has it, let an expression multiply both"
+            yield Finding(name, seen, action)
 
 
 def _velocity(columns: Mapping[str, NDArray], joint: JointSettings) -> Iterator[Finding]:
