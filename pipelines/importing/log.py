@@ -230,6 +230,7 @@ def read_log(source: Source, settings: ImportMap, map_path: Path) -> Log:
             )
     columns = _loaded(needed, source)
     findings = [Finding("rows", remark, "") for remark in source.remarks]
+    findings += _scaling(channels, source)
     note = noting("time", findings)
     if settings.time.column is None:
         # The longest, as constants have one row.
@@ -257,6 +258,18 @@ def read_log(source: Source, settings: ImportMap, map_path: Path) -> Log:
     time_s = clock.seconds(stamps, origin, settings.time, note)
     runs = tuple(clock.runs(time_s, stamps, settings.time.count_s, note))
     return Log(source, settings.time, channels, columns, origin, len(stamps), runs, findings)
+
+
+def _scaling(channels: Sequence[Channel], source: Source) -> Iterator[Finding]:
+    """Report factors and offsets in the file of which the map knows nothing."""
+    for channel in channels:
+        if channel.reading.model_fields_set & {"scale", "expression"}:
+            continue
+        for name in columns_of(channel.reading, channel.where):
+            text = source.scaling.get(source.column_named(name))
+            if text is not None:
+                action = "taken to be in the values; if not, set scale and zero"
+                yield Finding(channel.target, f"the file says {text} of {name!r}", action)
 
 
 def _loaded(needed: Mapping[str, str], source: Source) -> Columns:

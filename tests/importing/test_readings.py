@@ -8,6 +8,9 @@ from numpy.testing import assert_allclose
 
 from pipelines.settings.units import UNITS
 from tests.importing.conftest import MAP
+from tests.importing.test_guess import guessed
+
+__all__ = ["guessed"]
 
 WRITTEN = [
     ("rad", 1.0, ""),
@@ -577,3 +580,29 @@ def test_a_torque_of_one_sign_that_only_touches_zero_lacks_none(imported, pendul
     """As that of a brake, or of a joint that always carries its load to one side."""
     columns = pendulum.columns() | {"torque": 1.0 - np.cos(6.0 * pendulum.time)}
     assert "its sign is missing" not in imported(write_csv(columns)).printed
+
+
+@pytest.mark.parametrize(
+    ("above", "key"),
+    [
+        ("Factor,1,2,1,0.5\nstate,time,angle,velocity,torque\n", "x,"),
+        ("# Scale: 1,2,1,0.5\n# time,angle,velocity,torque\n", ""),
+        ("key,time,angle,velocity,torque\nGain [-],1,2,1,0.5\nOffset,0,0,0,0\n", ","),
+    ],
+)
+def test_factors_above_the_rows_are_named_until_the_map_has_a_scale(
+    imported, guessed, pendulum, write_csv, above, key
+):
+    path = write_csv(pendulum.columns(), header=False)
+    rows = path.read_text().splitlines()
+    path.write_text(above + "".join(f"{key}{row}\n" for row in rows))
+    outcome = imported(path)
+    assert outcome.code == 0
+    assert len(outcome.recording().frame) == 2000
+    assert " 2 of 'angle'; taken to be in the values" in outcome.printed
+    assert " 0.5 of 'torque'" in outcome.printed
+    assert "'velocity'" not in outcome.printed and "Offset" not in outcome.printed
+    scaled = MAP.replace('"rad" }', '"rad", scale = 2.0 }').replace('m" }', 'm", scale = 1.0 }')
+    assert "the file says" not in imported(path, map_text=scaled).printed
+    _, doubts = guessed(path)
+    assert "the file says" in doubts["joint"]
