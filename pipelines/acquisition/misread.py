@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipelines.acquisition.encodings import decimal_keys
+from pipelines.acquisition.leaps import sign_leap
 from pipelines.settings.rig import Register
 from pipelines.signals.folded import is_folded
 from pipelines.signals.held import are_held, new_values
@@ -26,6 +27,10 @@ def misread(quantity: str, register: Register, where: str, values: NDArray) -> I
     values : (n,) array
         In a row, as it reads them, SI units; NaN where missing.
     """
+    leaps = None if quantity in ("angle", "reference") else sign_leap(register, where, values)
+    if leaps is not None:
+        yield leaps
+        return
     if not register.turn and (rows := _at_an_end(register, values)):
         yield (
             f"{rows} of {len(values)} values are at the end of their register, where larger ones"
@@ -39,11 +44,33 @@ def misread(quantity: str, register: Register, where: str, values: NDArray) -> I
             for key, value in keys.items()
         )
         yield f"all digits are decimal, so the register is not binary; set {where}.{written}"
+    elif quantity in ("torque", "current") and _is_about_middle(register, new):
+        yield (
+            f"values lie about the middle of their register; if it stands for 0, set {where}.offset"
+            f" = {-_middle(register) * register.scale:g}"
+        )
     elif quantity in ("torque", "current") and is_folded(new - register.si[1]):
         yield (
             "values turn round at 0 as those of a magnitude do, so that their sign is missing; set"
             f" {where}.direction to the register that has it, or sign_bit"
         )
+
+
+def _is_about_middle(register: Register, values: NDArray) -> bool:
+    """Return whether values of one sign lie on both sides of the middle of their register."""
+    # Share of the register that they fill at most: else they lie all over it.
+    narrow = 0.125
+    if register.counts is None or not register.is_unsigned or register.offset != 0.0:
+        return False
+    size, middle = np.abs(values / register.si[0]), _middle(register)
+    if len(size) < 2 or register.encoding != "binary":
+        return False
+    return bool(size.min() < middle < size.max() and np.ptp(size) < 2.0 * narrow * middle)
+
+
+def _middle(register: Register) -> float:
+    """Return the count in the middle of an unsigned register."""
+    return 0.0 if register.counts is None else 0.5 * (register.counts[1] + 1)
 
 
 def held(time_s: NDArray, values: NDArray) -> Iterator[str]:

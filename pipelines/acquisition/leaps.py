@@ -1,0 +1,69 @@
+"""Leaps of a register's values, by a turn or a power of two of counts."""
+
+from math import pi
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipelines.settings.rig import Register
+
+
+def leap(register: Register, values: NDArray, of_turn: bool = False) -> float | None:
+    """Return the counts by which values leap, and go on from there; None where they do not.
+
+    Parameters
+    ----------
+    register : Register
+        As in the rig file.
+    values : (n,) array
+        In a row, as it reads them, SI units.
+    of_turn : bool
+        Whether they may leap by a turn, too.
+    """
+    if register.turn or len(values) < 2:
+        return None
+    per_count = abs(register.si[0])
+    counts = values / per_count
+    steps = np.abs(np.diff(counts))
+    # A leap is half of all that the value does; all else is small against it.
+    leaps = steps > 0.5 * np.ptp(counts)
+    if not leaps.any() or leaps.all():
+        return None
+    usual = float(steps[~leaps].max())
+    if usual > 0.125 * steps[leaps].min():
+        return None
+    turn = (2.0 * pi / per_count,) if of_turn else ()
+    for full in (*turn, *(2.0**bits for bits in range(8, 33))):
+        if (np.abs(steps[leaps] - full) <= 2.0 * usual + 1.0).all():
+            return full
+    return None
+
+
+def sign_leap(register: Register, where: str, values: NDArray) -> str | None:
+    """Return how values leap where they change their sign, with the keys that mend it.
+
+    Parameters
+    ----------
+    register : Register
+        As in the rig file.
+    where : str
+        Its place there.
+    values : (n,) array
+        In a row, as it reads them, SI units.
+    """
+    if register.registers > 1:
+        return None
+    full = leap(register, values)
+    if full == 2.0**16 and register.is_unsigned:
+        remedy = f'negative values are read as large ones; set {where}.type = "int16"'
+    elif full == 2.0**16:
+        middle = -32768.0 * register.scale
+        remedy = (
+            f'it counts from the middle of its range; set {where}.type = "uint16" and offset ='
+            f" {middle:g}"
+        )
+    elif full == 2.0**15:
+        remedy = f'it is a magnitude with a sign bit; set {where}.type = "uint16" and sign_bit = 15'
+    else:
+        return None
+    return f"leaps by {full:.0f} counts where it changes its sign: {remedy}"
