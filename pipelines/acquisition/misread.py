@@ -5,7 +5,7 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from pipelines.acquisition.encodings import decimal_keys
+from pipelines.acquisition.encodings import decimal_keys, is_gray
 from pipelines.acquisition.leaps import sign_leap
 from pipelines.settings.rig import Register
 from pipelines.signals.folded import is_folded
@@ -44,6 +44,11 @@ def misread(quantity: str, register: Register, where: str, values: NDArray) -> I
             for key, value in keys.items()
         )
         yield f"all digits are decimal, so the register is not binary; set {where}.{written}"
+    elif is_gray(register, new):
+        yield (
+            "values leap, and go on evenly as a Gray code; let the device write binary numbers, as"
+            " no key reads a Gray code"
+        )
     elif quantity in ("torque", "current") and _is_about_middle(register, new):
         yield (
             f"values lie about the middle of their register; if it stands for 0, set {where}.offset"

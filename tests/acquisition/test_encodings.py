@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from pipelines.acquisition.encodings import CHANCE, decimal_keys
+from pipelines.acquisition.encodings import CHANCE, decimal_keys, is_gray
+from pipelines.acquisition.misread import misread
 from pipelines.modbus.register_block import Block
 from pipelines.settings.rig import Register
 
@@ -41,6 +42,32 @@ def test_digits_are_named_and_nothing_is_where_they_are_read_as_such(device, use
     values = read(counts, device, used)
     assert decimal_keys(Register(address=0, **used), values) == missing
     assert decimal_keys(Register(address=0, **device), read(counts, device, device)) == {}
+
+
+@pytest.mark.parametrize("bits", [8, 12, 16])
+def test_a_gray_code_is_named_and_its_binary_values_are_not(bits):
+    """As of an encoder on 16 inputs of a gateway; a joint that moves by a tenth of a turn."""
+    register = Register(address=0, type="uint16", scale=0.5)
+    counts = np.round(2**bits * (0.5 + 0.05 * SWING)).astype(int)
+    (text,) = misread("angle", register, "angle", register.scale * (counts ^ counts >> 1))
+    assert "as a Gray code" in text
+    assert not is_gray(register, register.scale * counts)
+    assert not is_gray(register, (register.scale * (counts ^ counts >> 1))[:30])
+
+
+def test_binary_values_are_hardly_ever_taken_for_a_gray_code():
+    registers, alarms = 1000, 0
+    for seed in range(registers):
+        rng = np.random.default_rng(seed)
+        register = Register(address=0, type=str(rng.choice(["int16", "uint16", "int32", "uint32"])))
+        low, high = register.counts
+        size, middle = 10 ** rng.uniform(0.0, np.log10(high)), rng.uniform(-1.0, 1.0) * high
+        # A joint that rests, with a count or two of noise, shows no code either.
+        noise = rng.choice([0.5, 1.0, 0.01 * size]) * rng.normal(size=len(SWING))
+        counts = size * rng.choice([0.0, 1.0]) * SWING + noise + rng.choice([0.0, middle])
+        counts = np.clip(np.round(np.abs(counts) if low == 0 else counts), low, high)
+        alarms += is_gray(register, counts[np.append(True, np.diff(counts) != 0.0)])
+    assert alarms == 0
 
 
 def test_too_few_values_show_nothing():
