@@ -55,9 +55,14 @@ def misread(quantity: str, register: Register, where: str, values: NDArray) -> I
             f" = {-_middle(register) * register.scale:g}"
         )
     elif quantity in ("torque", "current") and is_folded(new - register.si[1]):
+        remedy = (
+            f"{where}.direction is the sign of something else, or comes late"
+            if register.direction is not None
+            else f"set {where}.direction to the register that has it, or sign_bit"
+        )
         yield (
-            "values turn round at 0 as those of a magnitude do, so that their sign is missing; set"
-            f" {where}.direction to the register that has it, or sign_bit"
+            "values turn round at 0 as those of a magnitude do, so that their sign is missing;"
+            f" {remedy}"
         )
 
 

@@ -186,7 +186,7 @@ def _unsigned(columns: Mapping[str, NDArray], joint: JointSettings) -> Iterator[
     for quantity in _torque_of(joint):
         name = joint.joint.column(quantity)
         if is_folded(columns[name][new_values(columns[name])]):
-            seen = "turns round at 0 as a magnitude does, so its sign is missing"
+            seen = "turns round at 0 as a magnitude does, so its sign is missing or wrong"
             action = "kept; where another column has it, let an expression multiply both"
             yield Finding(name, seen, action)
 
