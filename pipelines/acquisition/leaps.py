@@ -1,5 +1,6 @@
 """Leaps of a register's values, by a turn or a power of two of counts."""
 
+from collections.abc import Sequence
 from math import pi
 
 import numpy as np
@@ -8,7 +9,9 @@ from numpy.typing import NDArray
 from pipelines.settings.rig import Register
 
 
-def leap(register: Register, values: NDArray, of_turn: bool = False) -> float | None:
+def leap(
+    register: Register, values: NDArray, of_turn: bool = False, also: Sequence[float] = ()
+) -> float | None:
     """Return the counts by which values leap, and go on from there; None where they do not.
 
     Parameters
@@ -19,6 +22,8 @@ def leap(register: Register, values: NDArray, of_turn: bool = False) -> float | 
         In a row, as it reads them, SI units.
     of_turn : bool
         Whether they may leap by a turn, too.
+    also : sequence of float
+        Counts by which they may leap, too.
     """
     if register.turn or len(values) < 2:
         return None
@@ -33,7 +38,7 @@ def leap(register: Register, values: NDArray, of_turn: bool = False) -> float | 
     if usual > 0.125 * steps[leaps].min():
         return None
     turn = (2.0 * pi / per_count,) if of_turn else ()
-    for full in (*turn, *(2.0**bits for bits in range(8, 33))):
+    for full in (*turn, *also, *(2.0**bits for bits in range(8, 33))):
         if (np.abs(steps[leaps] - full) <= 2.0 * usual + 1.0).all():
             return full
     return None
@@ -51,7 +56,17 @@ def sign_leap(register: Register, where: str, values: NDArray) -> str | None:
     values : (n,) array
         In a row, as it reads them, SI units.
     """
-    if register.registers > 1:
+    if register.encoding == "bcd" and register.sign_bit is None:
+        # The sign's bit is the highest of a digit.
+        digits = 4 * register.registers
+        full = leap(register, values, also=(8.0 * 10.0 ** (digits - 1),))
+        if full != 8.0 * 10.0 ** (digits - 1):
+            return None
+        return (
+            f"leaps by {full:.0f} counts where it changes its sign: set {where}.sign_bit ="
+            f" {16 * register.registers - 1}"
+        )
+    if register.registers > 1 or register.encoding != "binary":
         return None
     full = leap(register, values)
     if full == 2.0**16 and register.is_unsigned:

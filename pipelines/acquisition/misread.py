@@ -27,15 +27,6 @@ def misread(quantity: str, register: Register, where: str, values: NDArray) -> I
     values : (n,) array
         In a row, as it reads them, SI units; NaN where missing.
     """
-    leaps = None if quantity in ("angle", "reference") else sign_leap(register, where, values)
-    if leaps is not None:
-        yield leaps
-        return
-    if not register.turn and (rows := _at_an_end(register, values)):
-        yield (
-            f"{rows} of {len(values)} values are at the end of their register, where larger ones"
-            " are cut off; let the device write coarser units, or two registers"
-        )
     new = values[new_values(values)]
     keys = decimal_keys(register, new)
     if keys:
@@ -44,7 +35,19 @@ def misread(quantity: str, register: Register, where: str, values: NDArray) -> I
             for key, value in keys.items()
         )
         yield f"all digits are decimal, so the register is not binary; set {where}.{written}"
-    elif is_gray(register, new):
+        return
+    # An angle may leap because it starts again after a turn.
+    may_start_again = quantity in ("angle", "reference") and register.encoding == "binary"
+    leaps = None if may_start_again else sign_leap(register, where, values)
+    if leaps is not None:
+        yield leaps
+        return
+    if not register.turn and (rows := _at_an_end(register, values)):
+        yield (
+            f"{rows} of {len(values)} values are at the end of their register, where larger ones"
+            " are cut off; let the device write coarser units, or two registers"
+        )
+    if is_gray(register, new):
         yield (
             "values leap, and go on evenly as a Gray code; let the device write binary numbers, as"
             " no key reads a Gray code"

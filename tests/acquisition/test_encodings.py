@@ -70,6 +70,22 @@ def test_binary_values_are_hardly_ever_taken_for_a_gray_code():
     assert alarms == 0
 
 
+@pytest.mark.parametrize(("kind", "bit"), [("uint16", 15), ("uint32", 31)])
+@pytest.mark.parametrize("quantity", ["angle", "torque"])
+def test_a_sign_of_decimal_digits_that_the_file_does_not_have_is_named(kind, bit, quantity):
+    signed = {"type": kind, "encoding": "bcd", "sign_bit": bit}
+    unsigned = {"type": kind, "encoding": "bcd"}
+    texts = list(
+        misread(quantity, Register(address=0, **unsigned), "x", read(300 * SWING, signed, unsigned))
+    )
+    assert len(texts) == 1 and f"set x.sign_bit = {bit}" in texts[0]
+    assert not list(
+        misread(quantity, Register(address=0, **signed), "x", read(300 * SWING, signed, signed))
+    )
+    wide = read(150 * (1 + SWING), unsigned, unsigned)
+    assert not [text for text in misread("angle", Register(address=0, **unsigned), "x", wide)]
+
+
 def test_too_few_values_show_nothing():
     values = read(30 * (1 + SWING), {"type": "uint16", **BCD}, {"type": "uint16"})
     assert decimal_keys(Register(address=0, type="uint16"), values[:30]) == {}
