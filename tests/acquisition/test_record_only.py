@@ -678,6 +678,28 @@ def test_a_torque_that_is_cut_off_at_the_end_of_its_register_is_named(tmp_path, 
         assert re.search(rf"{name}: \d+ of \d+ values are at the end of their register", text)
 
 
+@pytest.mark.parametrize("run", ["exo_alone", "with_human"])
+@pytest.mark.parametrize("scale", [0.1, -0.1])
+def test_a_torque_of_the_wrong_sign_is_named_where_nobody_is_in_the_machine(tmp_path, run, scale):
+    """Friction consumes what a drive delivers; a person may drive the machine."""
+
+    def answer(n, words):
+        phase = 0.1 * words[0]
+        torque = round(200.0 * np.cos(phase) - 300.0 * np.sin(phase))
+        return [words[0], round(700.0 * np.sin(phase)) & 0xFFFF, torque & 0xFFFF]
+
+    server, _ = a_device(answer)
+    path, output = tmp_path / "bench.toml", tmp_path / "bench.parquet"
+    text = BENCH.format(port=server.getsockname()[1], watchdog_s=1.0)
+    path.write_text(text.replace("scale = 0.1", f"scale = {scale}"))
+    settings = RunSettings(name="one", run=run, purpose="train", duration_s=2.0)
+    with server:
+        record_only(path, settings, output, 100.0, ELBOW)
+    texts = misread_values(output, path)
+    assert len(texts) == (run == "exo_alone" and scale < 0.0)
+    assert all("the drives absorb" in text for text in texts)
+
+
 ENCODED = {
     "mod10": ('type = "uint32", encoding = "mod10"', 'type = "uint32"'),
     "mod10, a sign each word": ('type = "int32", encoding = "mod10"', 'type = "int32"'),

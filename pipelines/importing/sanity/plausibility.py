@@ -9,7 +9,7 @@ from pipelines.contracts.checks import LARGEST_ANGLE_RAD
 from pipelines.contracts.joints import in_words
 from pipelines.errors import InputError
 from pipelines.importing.finding import Finding, counted
-from pipelines.importing.quantities.consistency import MOST, SPAN, integral_agreement, whole_rows
+from pipelines.importing.quantities.consistency import MOST, integral_agreement, whole_rows
 from pipelines.importing.quantities.wraparound import fill_value
 from pipelines.mechanics.geometry import Geometry
 from pipelines.mechanics.machine import known_in_words, machine_of, mechanisms_of
@@ -17,6 +17,7 @@ from pipelines.mechanics.remedies import AT_REST
 from pipelines.settings.import_map import ImportMap, JointSettings
 from pipelines.signals.folded import is_folded
 from pipelines.signals.held import new_values
+from pipelines.signals.power import GIVES_BACK, mean_power
 
 STRONGEST = {"torque": 1e3, "force": 1e5}
 """N·m and N; drives of legs, arms and robots deliver less, so more is mostly in another unit."""
@@ -211,27 +212,15 @@ def _velocity(columns: Mapping[str, NDArray], joint: JointSettings) -> Iterator[
 
 def _power(columns: Mapping[str, NDArray], joints: Sequence[JointSettings]) -> Iterator[Finding]:
     """Report drives that brake on average; a single one may, where another one moves it."""
-    # Share of the mean magnitude of power that the drives may absorb on average.
-    gives_back = 0.2
     powers = [_mean_power(columns, joint) for joint in joints]
     # Over all joints, because one joint's motion can drive another one's motor.
     mean, size = (sum(values) for values in zip(*powers, strict=True))
-    if mean < -gives_back * size:
+    if mean < -GIVES_BACK * size:
         seen = f"the drives absorb {-mean:.3g} W on average, but friction must consume power"
         yield Finding("torque", seen, "kept; check the signs of angles and torques")
 
 
 def _mean_power(columns: Mapping[str, NDArray], joint: JointSettings) -> tuple[float, float]:
-    """Return the mean and the mean magnitude of a drive's power, W; zeros for a short log."""
-    # The energy that a drive delivers between two equal states is lost to friction. The mean is
-    # thus positive where the signs of angle and torque agree.
+    """Return the mean and the mean magnitude of a drive's power, W."""
     names = [joint.joint.column(quantity) for quantity in ("angle", "torque")]
-    time_s, angle, torque = whole_rows(columns["time_s"], *(columns[name] for name in names))
-    if len(time_s) < 5 * SPAN:
-        return 0.0, 0.0
-    velocity = (angle[SPAN:] - angle[:-SPAN]) / (time_s[SPAN:] - time_s[:-SPAN])
-    # The mean torque over the span of the velocity: a shift in time between both would change their
-    # product.
-    averaged = np.convolve(torque, np.ones(SPAN + 1) / (SPAN + 1), "valid")
-    power = averaged * velocity
-    return float(np.mean(power)), float(np.mean(np.abs(power)))
+    return mean_power(*whole_rows(columns["time_s"], *(columns[name] for name in names)))
