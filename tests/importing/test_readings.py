@@ -606,3 +606,28 @@ def test_factors_above_the_rows_are_named_until_the_map_has_a_scale(
     assert "the file says" not in imported(path, map_text=scaled).printed
     _, doubts = guessed(path)
     assert "the file says" in doubts["joint"]
+
+
+@pytest.mark.parametrize("name", ["node", "Serial No.", "axis_id", "Gerät"])
+def test_rows_of_several_machines_are_named(imported, pendulum, write_csv, name):
+    """Their clocks go on together, as those of two drives on one bus."""
+    labels = np.where(np.arange(2000) // 500 % 2, "B7", "A3")
+    outcome = imported(write_csv(pendulum.columns() | {name: labels}))
+    assert outcome.code == 0
+    assert f"'{name}' is A3 in 1 000 rows, B7 in 1 000 rows; all kept as one" in outcome.printed
+    outcome = imported(write_csv(pendulum.columns() | {name: labels[:1].repeat(2000)}))
+    assert "kept as one" not in outcome.printed
+
+
+def test_rows_whose_values_are_no_measurements_are_named(imported, pendulum, write_csv):
+    """A historian repeats the last value while the connection is lost."""
+    labels = np.where(np.arange(2000) % 500 < 20, "Bad", "Good")
+    outcome = imported(write_csv(pendulum.columns() | {"Angle.Quality": labels}))
+    assert outcome.code == 0
+    assert "'Angle.Quality' is Good in 1 920 rows, Bad in 80 rows; all kept" in outcome.printed
+
+
+@pytest.mark.parametrize("name", ["joint_speed", "axis_temperature", "motor", "leg_id_rms"])
+def test_a_quantity_of_a_machine_is_no_label_of_its_rows(imported, pendulum, write_csv, name):
+    outcome = imported(write_csv(pendulum.columns() | {name: np.arange(2000) % 3}))
+    assert f"'{name}'" not in outcome.printed
