@@ -10,6 +10,7 @@ from pipelines.acquisition.leaps import sign_leap
 from pipelines.settings.rig import Register
 from pipelines.signals.folded import is_folded
 from pipelines.signals.held import are_held, new_values
+from pipelines.signals.rescaled import is_rescaled
 from pipelines.signals.sampling import sample_rate
 
 
@@ -56,6 +57,11 @@ def misread(quantity: str, register: Register, where: str, values: NDArray) -> I
         yield (
             f"values lie about the middle of their register; if it stands for 0, set {where}.offset"
             f" = {-_middle(register) * register.scale:g}"
+        )
+    elif quantity in ("torque", "current") and is_rescaled(new - register.si[1]):
+        yield (
+            "values leap by a factor of ten, and back, as those of a display with a decimal point"
+            " that moves; fix it in the device"
         )
     elif quantity in ("torque", "current") and is_folded(new - register.si[1]):
         remedy = (

@@ -86,6 +86,16 @@ def test_a_sign_of_decimal_digits_that_the_file_does_not_have_is_named(kind, bit
     assert not [text for text in misread("angle", Register(address=0, **unsigned), "x", wide)]
 
 
+def test_a_decimal_point_that_moves_is_named():
+    """As of a panel meter that writes the digits of its display."""
+    register = Register(address=0, type="int16", scale=0.01, unit="N·m")
+    torque = 5.0 * SWING
+    values = np.round(np.where(np.abs(torque) < 2.0, 10.0 * torque, torque), 2)
+    (text,) = misread("torque", register, "torque", values)
+    assert "values leap by a factor of ten" in text
+    assert not list(misread("torque", register, "torque", np.round(torque, 2)))
+
+
 def test_too_few_values_show_nothing():
     values = read(30 * (1 + SWING), {"type": "uint16", **BCD}, {"type": "uint16"})
     assert decimal_keys(Register(address=0, type="uint16"), values[:30]) == {}

@@ -576,6 +576,12 @@ def test_a_torque_without_its_sign_is_named(imported, pendulum, write_csv):
     assert "its sign is missing" not in imported(write_csv(pendulum.columns())).printed
 
 
+def test_a_torque_whose_decimal_point_moves_is_named(imported, pendulum, write_csv):
+    torque = np.where(np.abs(pendulum.torque) < 0.5, 10.0 * pendulum.torque, pendulum.torque)
+    printed = imported(write_csv(pendulum.columns() | {"torque": torque})).printed
+    assert "pivot_torque_nm: leaps by a factor of ten, and back" in printed
+
+
 def test_a_torque_of_one_sign_that_only_touches_zero_lacks_none(imported, pendulum, write_csv):
     """As that of a brake, or of a joint that always carries its load to one side."""
     columns = pendulum.columns() | {"torque": 1.0 - np.cos(6.0 * pendulum.time)}

@@ -18,6 +18,7 @@ from pipelines.settings.import_map import ImportMap, JointSettings
 from pipelines.signals.folded import is_folded
 from pipelines.signals.held import new_values
 from pipelines.signals.power import GIVES_BACK, mean_power
+from pipelines.signals.rescaled import is_rescaled
 
 STRONGEST = {"torque": 1e3, "force": 1e5}
 """N·m and N; drives of legs, arms and robots deliver less, so more is mostly in another unit."""
@@ -68,6 +69,7 @@ def check(columns: Mapping[str, NDArray], settings: ImportMap) -> Iterator[Findi
         yield from _turns_on(columns, joint)
         yield from _slips(columns, joint)
         yield from _too_strong(columns, joint)
+        yield from _rescaled(columns, joint)
         yield from _unsigned(columns, joint)
     joints = [joint.joint for joint in settings.joint]
     # Drives whose torque was not measured may do the work that the others absorb.
@@ -180,6 +182,15 @@ def _too_strong(columns: Mapping[str, NDArray], joint: JointSettings) -> Iterato
             seen,
             f"kept; check its unit (is it m{unit}?), scale, gear_ratio and torque constant",
         )
+
+
+def _rescaled(columns: Mapping[str, NDArray], joint: JointSettings) -> Iterator[Finding]:
+    """Report a torque that was logged with another factor now and then."""
+    for quantity in _torque_of(joint):
+        name = joint.joint.column(quantity)
+        if is_rescaled(columns[name][new_values(columns[name])]):
+            seen = "leaps by a factor of ten, and back, as a display whose decimal point moves"
+            yield Finding(name, seen, "kept; log it with one decimal point")
 
 
 def _unsigned(columns: Mapping[str, NDArray], joint: JointSettings) -> Iterator[Finding]:
