@@ -66,19 +66,23 @@ def sign_leap(register: Register, where: str, values: NDArray) -> str | None:
             f"leaps by {full:.0f} counts where it changes its sign: set {where}.sign_bit ="
             f" {16 * register.registers - 1}"
         )
-    if register.registers > 1 or register.encoding != "binary":
+    bits = 16 * register.registers
+    if bits > 32 or register.encoding != "binary" or register.counts is None:
         return None
     full = leap(register, values)
-    if full == 2.0**16 and register.is_unsigned:
-        remedy = f'negative values are read as large ones; set {where}.type = "int16"'
-    elif full == 2.0**16:
-        middle = -32768.0 * register.scale
+    if full == 2.0**bits and register.is_unsigned:
+        remedy = f'negative values are read as large ones; set {where}.type = "int{bits}"'
+    elif full == 2.0**bits:
+        middle = -(2.0 ** (bits - 1)) * register.scale
         remedy = (
-            f'it counts from the middle of its range; set {where}.type = "uint16" and offset ='
+            f'it counts from the middle of its range; set {where}.type = "uint{bits}" and offset ='
             f" {middle:g}"
         )
-    elif full == 2.0**15:
-        remedy = f'it is a magnitude with a sign bit; set {where}.type = "uint16" and sign_bit = 15'
+    elif full == 2.0 ** (bits - 1):
+        remedy = (
+            f'it is a magnitude with a sign bit; set {where}.type = "uint{bits}" and sign_bit ='
+            f" {bits - 1}"
+        )
     else:
         return None
     return f"leaps by {full:.0f} counts where it changes its sign: {remedy}"

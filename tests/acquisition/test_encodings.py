@@ -96,6 +96,28 @@ def test_a_decimal_point_that_moves_is_named():
     assert not list(misread("torque", register, "torque", np.round(torque, 2)))
 
 
+@pytest.mark.parametrize("bits", [16, 32])
+@pytest.mark.parametrize(
+    ("device", "used", "named"),
+    [
+        ({"type": "uint", "sign_bit": -1}, {"type": "uint"}, "and sign_bit = {sign}"),
+        ({"type": "uint", "sign_bit": -1}, {"type": "int"}, "and sign_bit = {sign}"),
+        ({"type": "int"}, {"type": "uint"}, 'type = "int{bits}"'),
+        ({"type": "int"}, {"type": "int"}, ""),
+    ],
+)
+def test_a_misread_sign_is_named_in_registers_of_any_length(device, used, named, bits):
+    def keys_of(keys):
+        sign = {"sign_bit": bits - 1} if "sign_bit" in keys else {}
+        return {"type": f"{keys['type']}{bits}"} | sign
+
+    device, used = keys_of(device), keys_of(used)
+    values = read(np.round(1000 * SWING), device, used)
+    texts = list(misread("torque", Register(address=0, **used), "x", values))
+    assert len(texts) == bool(named)
+    assert all(named.format(bits=bits, sign=bits - 1) in text for text in texts)
+
+
 def test_too_few_values_show_nothing():
     values = read(30 * (1 + SWING), {"type": "uint16", **BCD}, {"type": "uint16"})
     assert decimal_keys(Register(address=0, type="uint16"), values[:30]) == {}
