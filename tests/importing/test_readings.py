@@ -637,3 +637,31 @@ def test_rows_whose_values_are_no_measurements_are_named(imported, pendulum, wri
 def test_a_quantity_of_a_machine_is_no_label_of_its_rows(imported, pendulum, write_csv, name):
     outcome = imported(write_csv(pendulum.columns() | {name: np.arange(2000) % 3}))
     assert f"'{name}'" not in outcome.printed
+
+
+@pytest.mark.parametrize(
+    ("first", "second", "later"),
+    [
+        (slice(0, None, 2), slice(1, None, 2), "0.5 of a row apart"),
+        (slice(0, 1000), slice(0, 1000), "0.0 of a row apart"),
+        (slice(0, 1000), slice(40, 1040), ""),
+    ],
+    ids=["two samples a row", "one column twice", "another motion"],
+)
+def test_joints_that_are_one_are_named(imported, pendulum, write_csv, first, second, later):
+    """A logger that sends packets writes several samples in a row, angle0 and angle1."""
+    columns = {"time": pendulum.time[first]}
+    text = MAP.split("[[joint]]")[0]
+    for k, rows in enumerate((first, second)):
+        noise = 1e-4 * np.random.default_rng(k).normal(size=1000)
+        columns |= {f"angle{k}": pendulum.angle[rows] + noise, f"torque{k}": pendulum.torque[rows]}
+        text += (
+            f'[[joint]]\nname = "joint{k}"\nangle = {{ column = "angle{k}", unit = "rad" }}\n'
+            f'torque = {{ column = "torque{k}", unit = "N·m" }}\n'
+        )
+    text += '[[recording]]\nname = "whole"\npurpose = "train"\n'
+    outcome = imported(write_csv(columns), map_text=text)
+    assert outcome.code == 0
+    expected = "joint1_angle_rad: is joint0_angle_rad, "
+    assert (expected in outcome.printed) == bool(later)
+    assert later in outcome.printed

@@ -1,6 +1,7 @@
 """Report implausible values in an imported recording, without correcting them."""
 
 from collections.abc import Iterator, Mapping, Sequence
+from itertools import combinations
 
 import numpy as np
 from numpy.typing import NDArray
@@ -71,6 +72,7 @@ def check(columns: Mapping[str, NDArray], settings: ImportMap) -> Iterator[Findi
         yield from _too_strong(columns, joint)
         yield from _rescaled(columns, joint)
         yield from _unsigned(columns, joint)
+    yield from _copies(columns, settings.joint)
     joints = [joint.joint for joint in settings.joint]
     # Drives whose torque was not measured may do the work that the others absorb.
     if all(joint.is_measured for joint in joints):
@@ -182,6 +184,26 @@ def _too_strong(columns: Mapping[str, NDArray], joint: JointSettings) -> Iterato
             seen,
             f"kept; check its unit (is it m{unit}?), scale, gear_ratio and torque constant",
         )
+
+
+def _copies(columns: Mapping[str, NDArray], joints: Sequence[JointSettings]) -> Iterator[Finding]:
+    """Report joints whose angles are those of another, as of several samples in a row."""
+    # Share of a motion by which the angles of two joints differ at least, as an rms value.
+    least = 0.005
+    names = [joint.joint.column("angle") for joint in joints]
+    for one, other in combinations(names, 2):
+        values, copy = (columns[name] - np.mean(columns[name]) for name in (one, other))
+        motion, moves = float(values @ values), np.diff(values)
+        if motion == 0.0:
+            continue
+        # Another sample of a row is later by a share of the time to the next row.
+        apart = (copy - values)[:-1]
+        share = float(apart @ moves) / float(moves @ moves)
+        left = apart - share * moves
+        if abs(share) < 1.0 and float(left @ left) < least**2 * motion:
+            seen = f"is {one}, {abs(share):.1f} of a row apart"
+            action = "kept; if both are one joint's, give each sample a row, and leave one out"
+            yield Finding(other, seen, action)
 
 
 def _rescaled(columns: Mapping[str, NDArray], joint: JointSettings) -> Iterator[Finding]:
