@@ -76,7 +76,7 @@ def sign_leap(register: Register, where: str, values: NDArray) -> str | None:
         middle = -(2.0 ** (bits - 1)) * register.scale
         remedy = (
             f'it counts from the middle of its range; set {where}.type = "uint{bits}" and offset ='
-            f" {middle:g}"
+            f" {middle:g}. Or it is the low word of a longer value"
         )
     elif full == 2.0 ** (bits - 1):
         remedy = (

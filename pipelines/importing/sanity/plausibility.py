@@ -199,8 +199,8 @@ def _copies(columns: Mapping[str, NDArray], joints: Sequence[JointSettings]) -> 
         # Another sample of a row is later by a share of the time to the next row.
         apart = (copy - values)[:-1]
         share = float(apart @ moves) / float(moves @ moves)
-        left = apart - share * moves
-        if abs(share) < 1.0 and float(left @ left) < least**2 * motion:
+        rest = apart - share * moves
+        if abs(share) < 1.0 and float(rest @ rest) < least**2 * motion:
             seen = f"is {one}, {abs(share):.1f} of a row apart"
             action = "kept; if both are one joint's, give each sample a row, and leave one out"
             yield Finding(other, seen, action)
