@@ -1,4 +1,4 @@
-"""Which encoding by decimal digits the values of a register show, where they are read as binary.
+"""Which encoding the values of a register show, where they are read as plain binary numbers.
 
 Binary values have digits above 9 and words above 9999. A register that never has any is not binary,
 unless by chance, which becomes small with each value that could have had one.
@@ -35,14 +35,9 @@ def decimal_keys(register: Register, values: NDArray) -> dict[str, str | int]:
     dict
         Values by the rig file's keys; empty where the register is binary, or values are too few.
     """
-    if register.counts is None or register.encoding != "binary" or register.registers > LONGEST:
+    if not _is_judged(register):
         return {}
-    scale, offset = register.si
-    read = np.round((values[np.isfinite(values)] - offset) / scale).astype(np.int64)
-    if register.direction is not None:
-        read = np.abs(read)
-    bits = 16 * register.registers
-    raw = [raw_of(register, count) % 2**bits for count in read.tolist()]
+    bits, raw = 16 * register.registers, _raw(register, values)
     shown: list[tuple[float, dict[str, str | int]]] = []
     for keys in _possible_keys(register.type, bits):
         decimal = register.model_copy(update={"sign_bit": None, **keys})
@@ -52,6 +47,50 @@ def decimal_keys(register: Register, values: NDArray) -> dict[str, str | int]:
     # A sign bit may be a digit, too; where it is, values leap.
     _, best = min(shown, key=itemgetter(0), default=(0.0, {}))
     return {key: value for key, value in best.items() if getattr(register, key) != value}
+
+
+def is_gray(register: Register, values: NDArray) -> bool:
+    """Return whether values go on evenly only if their bits are a Gray code, as an encoder's.
+
+    From a count to the next, one bit of a Gray code changes: read as binary, it leaps by a power of
+    two. Binary values that are decoded as Gray code leap instead.
+
+    Parameters
+    ----------
+    register : Register
+        As in the rig file.
+    values : (n,) array
+        New values in a row, as it reads them, SI units.
+    """
+    # Steps that are no coincidence, and the share of the way that they leave.
+    enough, least = 30, 0.5
+    if not _is_judged(register) or len(values) <= enough:
+        return False
+    raw = np.array(_raw(register, values), dtype=np.int64)
+    decoded = raw.copy()
+    for shift in (1, 2, 4, 8, 16):
+        decoded ^= decoded >> shift
+    # As binary numbers, the highest is next to the lowest: -1 to 0.
+    full = 2 ** (16 * register.registers)
+    steps = np.diff(raw) % full
+    way = float(np.minimum(steps, full - steps).sum())
+    return float(np.abs(np.diff(decoded)).sum()) < least * way
+
+
+def _is_judged(register: Register) -> bool:
+    """Return whether a register is read as a binary integer that is not too long."""
+    is_binary = register.counts is not None and register.encoding == "binary"
+    return is_binary and register.registers <= LONGEST
+
+
+def _raw(register: Register, values: NDArray) -> list[int]:
+    """Return the bits of values (n,) as unsigned numbers."""
+    scale, offset = register.si
+    read = np.round((values[np.isfinite(values)] - offset) / scale).astype(np.int64)
+    if register.direction is not None:
+        read = np.abs(read)
+    bits = 16 * register.registers
+    return [raw_of(register, count) % 2**bits for count in read.tolist()]
 
 
 def _possible_keys(kind: str, bits: int) -> Iterator[dict[str, str | int]]:

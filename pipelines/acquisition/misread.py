@@ -5,10 +5,12 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from pipelines.acquisition.encodings import decimal_keys
+from pipelines.acquisition.encodings import decimal_keys, is_gray
+from pipelines.acquisition.leaps import sign_leap
 from pipelines.settings.rig import Register
 from pipelines.signals.folded import is_folded
 from pipelines.signals.held import are_held, new_values
+from pipelines.signals.rescaled import is_rescaled
 from pipelines.signals.sampling import sample_rate
 
 
@@ -26,11 +28,6 @@ def misread(quantity: str, register: Register, where: str, values: NDArray) -> I
     values : (n,) array
         In a row, as it reads them, SI units; NaN where missing.
     """
-    if not register.turn and (rows := _at_an_end(register, values)):
-        yield (
-            f"{rows} of {len(values)} values are at the end of their register, where larger ones"
-            " are cut off; let the device write coarser units, or two registers"
-        )
     new = values[new_values(values)]
     keys = decimal_keys(register, new)
     if keys:
@@ -39,11 +36,60 @@ def misread(quantity: str, register: Register, where: str, values: NDArray) -> I
             for key, value in keys.items()
         )
         yield f"all digits are decimal, so the register is not binary; set {where}.{written}"
-    elif quantity in ("torque", "current") and is_folded(new - register.si[1]):
+        return
+    # An angle may leap because it starts again after a turn.
+    may_start_again = quantity in ("angle", "reference") and register.encoding == "binary"
+    leaps = None if may_start_again else sign_leap(register, where, values)
+    if leaps is not None:
+        yield leaps
+        return
+    if not register.turn and (rows := _at_an_end(register, values)):
         yield (
-            "values turn round at 0 as those of a magnitude do, so that their sign is missing; set"
-            f" {where}.direction to the register that has it, or sign_bit"
+            f"{rows} of {len(values)} values are at the end of their register, where larger ones"
+            " are cut off; let the device write coarser units, or two registers"
         )
+    if is_gray(register, new):
+        yield (
+            "values leap, and go on evenly as a Gray code; let the device write binary numbers, as"
+            " no key reads a Gray code"
+        )
+    elif quantity in ("torque", "current") and _is_about_middle(register, new):
+        yield (
+            f"values lie about the middle of their register; if it stands for 0, set {where}.offset"
+            f" = {-_middle(register) * register.scale:g}"
+        )
+    elif quantity in ("torque", "current") and is_rescaled(new - register.si[1]):
+        yield (
+            "values leap by a factor of ten, and back, as those of a display with a decimal point"
+            " that moves; fix it in the device"
+        )
+    elif quantity in ("torque", "current") and is_folded(new - register.si[1]):
+        remedy = (
+            f"{where}.direction is the sign of something else, or comes late"
+            if register.direction is not None
+            else f"set {where}.direction to the register that has it, or sign_bit"
+        )
+        yield (
+            "values turn round at 0 as those of a magnitude do, so that their sign is missing;"
+            f" {remedy}"
+        )
+
+
+def _is_about_middle(register: Register, values: NDArray) -> bool:
+    """Return whether values of one sign lie on both sides of the middle of their register."""
+    # Share of the register that they fill at most: else they lie all over it.
+    narrow = 0.125
+    if register.counts is None or not register.is_unsigned or register.offset != 0.0:
+        return False
+    size, middle = np.abs(values / register.si[0]), _middle(register)
+    if len(size) < 2 or register.encoding != "binary":
+        return False
+    return bool(size.min() < middle < size.max() and np.ptp(size) < 2.0 * narrow * middle)
+
+
+def _middle(register: Register) -> float:
+    """Return the count in the middle of an unsigned register."""
+    return 0.0 if register.counts is None else 0.5 * (register.counts[1] + 1)
 
 
 def held(time_s: NDArray, values: NDArray) -> Iterator[str]:

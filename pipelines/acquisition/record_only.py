@@ -8,11 +8,12 @@ give the uncertainty of a row's time.
 import asyncio
 import logging
 import time
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pandas as pd
 
 from pipelines.acquisition.machine.read_only import ReadOnlyMachine, ReadOnlyRow
 from pipelines.acquisition.machine.torn_words import TornRows
@@ -35,6 +36,7 @@ from pipelines.process.priority import urgent
 from pipelines.settings.acquire import RunSettings
 from pipelines.settings.mechanism import MechanismSettings
 from pipelines.settings.rig.recording_only import RecordingRig, load_recording_rig
+from pipelines.signals.power import GIVES_BACK, mean_power
 
 Report = Callable[[float, int], None]
 """Takes the time since the recording began, s, and the number of rows."""
@@ -95,7 +97,8 @@ def record_only(
 
 def misread_values(path: Path, rig_path: Path) -> list[str]:
     """Return warnings of a recording's values that are possible one by one, but not in a row."""
-    frame, rig = RECORDING.read(path).frame, load_recording_rig(rig_path)
+    table, rig = RECORDING.read(path), load_recording_rig(rig_path)
+    frame = table.frame
     time_s = frame["time_s"].to_numpy()
     channels: dict[str, list[str]] = {}
     for joint in rig.drive:
@@ -108,7 +111,28 @@ def misread_values(path: Path, rig_path: Path) -> list[str]:
             texts = misread(quantity, register, f"{where}.{quantity}", values)
             for text in (*texts, *held(time_s, values)):
                 channels.setdefault(text, []).append(column)
-    return [f"{path}: {', '.join(columns)}: {text}" for text, columns in channels.items()]
+    warnings = [f"{path}: {', '.join(columns)}: {text}" for text, columns in channels.items()]
+    if table.metadata["run"] == "exo_alone":  # a person may move the drives
+        warnings += [f"{path}: {text}" for text in _absorbed(frame, rig)]
+    return warnings
+
+
+def _absorbed(frame: pd.DataFrame, rig: RecordingRig) -> Iterator[str]:
+    """Yield that drives take up energy on average, of all joints: one may move another's motor."""
+    powers = [
+        mean_power(
+            frame["time_s"].to_numpy(),
+            frame[f"{joint.joint}_angle_rad"].to_numpy(),
+            frame[f"{joint.joint}_torque_nm"].to_numpy(),
+        )
+        for joint in rig.drive
+    ]
+    mean, size = (sum(values) for values in zip(*powers, strict=True))
+    if mean < -GIVES_BACK * size:
+        yield (
+            f"the drives absorb {-mean:.3g} W on average, but friction must consume power; check"
+            " the signs of angles and torques (scale, direction)"
+        )
 
 
 def _refuse_other_joints(rig: RecordingRig, mechanism: MechanismSettings) -> None:

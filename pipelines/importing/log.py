@@ -13,6 +13,7 @@ from pipelines.errors import InputError, SettingsError
 from pipelines.importing.finding import Finding, counted, noting, unnoted
 from pipelines.importing.quantities.conversion import columns_of, quantity
 from pipelines.importing.quantities.numbers import TAKEN_FOR_MISSING, numbers, same_stamps
+from pipelines.importing.sanity.labels import labels_in
 from pipelines.importing.sources.source import Columns, Source
 from pipelines.importing.time import clock
 from pipelines.importing.time.clock import Run
@@ -50,6 +51,8 @@ class Log:
     settings: TimeSettings
     channels: tuple[Channel, ...]
     columns: Columns
+    labels: Columns
+    """Columns that say of which machine a row is, or whether its values are good."""
     origin: float
     """The first stamp of the clock."""
     rows: int
@@ -228,8 +231,10 @@ def read_log(source: Source, settings: ImportMap, map_path: Path) -> Log:
             raise SettingsError(
                 f"has no column {name!r}, which {where} in {map_path} names; {reason}"
             )
-    columns = _loaded(needed, source)
+    others = [name for name in labels_in(source.names) if name not in needed]
+    columns, labels = _loaded(needed, source, others)
     findings = [Finding("rows", remark, "") for remark in source.remarks]
+    findings += _scaling(channels, source)
     note = noting("time", findings)
     if settings.time.column is None:
         # The longest, as constants have one row.
@@ -237,7 +242,7 @@ def read_log(source: Source, settings: ImportMap, map_path: Path) -> Log:
         note("no clock in the log", f"rows taken for uniform at {rate_hz:g} Hz, by the map")
         run = Run(np.arange(rows), np.arange(rows) / rate_hz, 0.0)
         columns = _as_numbers(columns, set(), findings)
-        return Log(source, settings.time, channels, columns, 0.0, rows, (run,), findings)
+        return Log(source, settings.time, channels, columns, labels, 0.0, rows, (run,), findings)
     column = settings.time.column
     clocks = {channel.time for channel in channels} | {column, settings.time.plus}
     # A clock that is the same as that of the log is none of the channel's own.
@@ -256,11 +261,27 @@ def read_log(source: Source, settings: ImportMap, map_path: Path) -> Log:
     origin = clock.first_stamp(stamps)
     time_s = clock.seconds(stamps, origin, settings.time, note)
     runs = tuple(clock.runs(time_s, stamps, settings.time.count_s, note))
-    return Log(source, settings.time, channels, columns, origin, len(stamps), runs, findings)
+    return Log(
+        source, settings.time, channels, columns, labels, origin, len(stamps), runs, findings
+    )
 
 
-def _loaded(needed: Mapping[str, str], source: Source) -> Columns:
-    """Return the columns by their names in the map."""
+def _scaling(channels: Sequence[Channel], source: Source) -> Iterator[Finding]:
+    """Report factors and offsets in the file of which the map knows nothing."""
+    for channel in channels:
+        if channel.reading.model_fields_set & {"scale", "expression"}:
+            continue
+        for name in columns_of(channel.reading, channel.where):
+            text = source.scaling.get(source.column_named(name))
+            if text is not None:
+                action = "taken to be in the values; if not, set scale and zero"
+                yield Finding(channel.target, f"the file says {text} of {name!r}", action)
+
+
+def _loaded(
+    needed: Mapping[str, str], source: Source, others: Sequence[str]
+) -> tuple[Columns, Columns]:
+    """Return the columns by their names in the map, and other ones."""
     columns = {name: source.column_named(name) for name in needed}
     for column, times in Counter(columns.values()).items():
         if times > 1:
@@ -269,8 +290,12 @@ def _loaded(needed: Mapping[str, str], source: Source) -> Columns:
             raise SettingsError(
                 f"the columns {', '.join(names)} in the map are one, of {places}; correct one"
             )
-    loaded = source.load(list(columns.values()))
-    return {name: loaded[column] for name, column in columns.items()}
+    others = [name for name in others if name not in columns.values()]
+    loaded = source.load([*columns.values(), *others])
+    return (
+        {name: loaded[column] for name, column in columns.items()},
+        {name: loaded[name] for name in others},
+    )
 
 
 def _similar(name: str, names: Sequence[str]) -> str:

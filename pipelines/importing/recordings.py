@@ -17,7 +17,7 @@ from pipelines.errors import InputError, SettingsError, about
 from pipelines.importing.finding import Finding, Note, counted, noting
 from pipelines.importing.log import Log, read_log
 from pipelines.importing.quantities.numbers import TAKEN_FOR_MISSING
-from pipelines.importing.sanity import plausibility
+from pipelines.importing.sanity import labels, plausibility
 from pipelines.importing.sources.joined import open_run, parts_of
 from pipelines.importing.time import held
 from pipelines.importing.time.clock import FASTEST_HZ, SLOWEST_HZ, Run, Sampling
@@ -162,6 +162,13 @@ def _recordings_of(
     _note_period(columns, settings, wanted, note)
     # On the whole run: short spans show less, and each would repeat the remarks.
     findings += plausibility.check(columns, settings)
+    findings += labels.check(
+        {
+            name: values[run.rows][whole]
+            for name, values in log.labels.items()
+            if len(values) == log.rows
+        }
+    )
     findings += _turns_apart(f"{path.name}{suffix}", columns, log.turns, begins)
     spans = [_span(time, float(run.time_s[-1]), recording) for recording in wanted]
     _check_overlap(time, wanted, spans)

@@ -2,7 +2,8 @@
 
 A quantity that crosses zero goes on as it came. Its magnitude turns round there as sharply as it
 came: the next value lies where a straight line through the two before leads, but for the sign. A
-channel that ends at zero stays there, and one that only touches zero turns round smoothly.
+channel that ends at zero stays there, and one that only touches zero turns round smoothly. A
+magnitude with the sign of something else turns round at zero, too, and leaps elsewhere.
 """
 
 import numpy as np
@@ -21,7 +22,7 @@ LENGTHS = (1, 2, 4, 8)
 
 
 def is_folded(values: NDArray) -> bool:
-    """Return whether values of one sign turn round at zero as a magnitude does.
+    """Return whether values turn round at zero as a magnitude does.
 
     Parameters
     ----------
@@ -29,25 +30,25 @@ def is_folded(values: NDArray) -> bool:
         New readings in a row, in any unit, zero where the quantity is zero; NaN where missing.
     """
     known = values[np.isfinite(values)]
-    if not (np.all(known >= 0.0) or np.all(known <= 0.0)):
-        return False
-    size = np.abs(known)
-    lengths = (length for length in LENGTHS if len(size) >= 3 * length)
+    lengths = (length for length in LENGTHS if len(known) >= 3 * length)
     return any(
-        _turns_round(size[: len(size) // length * length].reshape(-1, length).mean(axis=1))
+        _turns_round(known[: len(known) // length * length].reshape(-1, length).mean(axis=1))
         for length in lengths
     )
 
 
-def _turns_round(size: NDArray) -> bool:
-    """Return whether values (n,) of zero and above turn round at zero as sharply as they came."""
-    steps = np.diff(np.unique(size))
+def _turns_round(values: NDArray) -> bool:
+    """Return whether values (n,) turn round at zero as sharply as they came."""
+    steps = np.diff(np.unique(np.abs(values)))
     # Differences by rounding in float64 are no steps.
-    steps = steps[steps > 1e-9 * size.max()]
-    ahead = 2.0 * size[1:-1] - size[:-2]
+    steps = steps[steps > 1e-9 * np.abs(values).max()]
+    ahead = 2.0 * values[1:-1] - values[:-2]
     # Noise and the smallest step let values turn round without any crossing.
-    noise = float(np.median(np.abs(size[2:] - ahead)))
+    noise = float(np.median(np.abs(values[2:] - ahead)))
+    # As if all came from above.
+    side = np.sign(values[1:-1])
+    ahead, after = side * ahead, side * values[2:]
     crosses = ahead < -2.0 * max(steps.min(initial=np.inf), noise)
-    far, came = -ahead[crosses], size[2:][crosses]
+    far, came = -ahead[crosses], after[crosses]
     goes_on = came > 0.5 * far
     return bool(len(far) >= CROSSINGS and np.mean(goes_on) >= SHARE)

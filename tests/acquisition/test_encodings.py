@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from pipelines.acquisition.encodings import CHANCE, decimal_keys
+from pipelines.acquisition.encodings import CHANCE, decimal_keys, is_gray
+from pipelines.acquisition.misread import misread
 from pipelines.modbus.register_block import Block
 from pipelines.settings.rig import Register
 
@@ -41,6 +42,80 @@ def test_digits_are_named_and_nothing_is_where_they_are_read_as_such(device, use
     values = read(counts, device, used)
     assert decimal_keys(Register(address=0, **used), values) == missing
     assert decimal_keys(Register(address=0, **device), read(counts, device, device)) == {}
+
+
+@pytest.mark.parametrize("bits", [8, 12, 16])
+def test_a_gray_code_is_named_and_its_binary_values_are_not(bits):
+    """As of an encoder on 16 inputs of a gateway; a joint that moves by a tenth of a turn."""
+    register = Register(address=0, type="uint16", scale=0.5)
+    counts = np.round(2**bits * (0.5 + 0.05 * SWING)).astype(int)
+    (text,) = misread("angle", register, "angle", register.scale * (counts ^ counts >> 1))
+    assert "as a Gray code" in text
+    assert not is_gray(register, register.scale * counts)
+    assert not is_gray(register, (register.scale * (counts ^ counts >> 1))[:30])
+
+
+def test_binary_values_are_hardly_ever_taken_for_a_gray_code():
+    registers, alarms = 1000, 0
+    for seed in range(registers):
+        rng = np.random.default_rng(seed)
+        register = Register(address=0, type=str(rng.choice(["int16", "uint16", "int32", "uint32"])))
+        low, high = register.counts
+        size, middle = 10 ** rng.uniform(0.0, np.log10(high)), rng.uniform(-1.0, 1.0) * high
+        # A joint that rests, with a count or two of noise, shows no code either.
+        noise = rng.choice([0.5, 1.0, 0.01 * size]) * rng.normal(size=len(SWING))
+        counts = size * rng.choice([0.0, 1.0]) * SWING + noise + rng.choice([0.0, middle])
+        counts = np.clip(np.round(np.abs(counts) if low == 0 else counts), low, high)
+        alarms += is_gray(register, counts[np.append(True, np.diff(counts) != 0.0)])
+    assert alarms == 0
+
+
+@pytest.mark.parametrize(("kind", "bit"), [("uint16", 15), ("uint32", 31)])
+@pytest.mark.parametrize("quantity", ["angle", "torque"])
+def test_a_sign_of_decimal_digits_that_the_file_does_not_have_is_named(kind, bit, quantity):
+    signed = {"type": kind, "encoding": "bcd", "sign_bit": bit}
+    unsigned = {"type": kind, "encoding": "bcd"}
+    texts = list(
+        misread(quantity, Register(address=0, **unsigned), "x", read(300 * SWING, signed, unsigned))
+    )
+    assert len(texts) == 1 and f"set x.sign_bit = {bit}" in texts[0]
+    assert not list(
+        misread(quantity, Register(address=0, **signed), "x", read(300 * SWING, signed, signed))
+    )
+    wide = read(150 * (1 + SWING), unsigned, unsigned)
+    assert not [text for text in misread("angle", Register(address=0, **unsigned), "x", wide)]
+
+
+def test_a_decimal_point_that_moves_is_named():
+    """As of a panel meter that writes the digits of its display."""
+    register = Register(address=0, type="int16", scale=0.01, unit="N·m")
+    torque = 5.0 * SWING
+    values = np.round(np.where(np.abs(torque) < 2.0, 10.0 * torque, torque), 2)
+    (text,) = misread("torque", register, "torque", values)
+    assert "values leap by a factor of ten" in text
+    assert not list(misread("torque", register, "torque", np.round(torque, 2)))
+
+
+@pytest.mark.parametrize("bits", [16, 32])
+@pytest.mark.parametrize(
+    ("device", "used", "named"),
+    [
+        ({"type": "uint", "sign_bit": -1}, {"type": "uint"}, "and sign_bit = {sign}"),
+        ({"type": "uint", "sign_bit": -1}, {"type": "int"}, "and sign_bit = {sign}"),
+        ({"type": "int"}, {"type": "uint"}, 'type = "int{bits}"'),
+        ({"type": "int"}, {"type": "int"}, ""),
+    ],
+)
+def test_a_misread_sign_is_named_in_registers_of_any_length(device, used, named, bits):
+    def keys_of(keys):
+        sign = {"sign_bit": bits - 1} if "sign_bit" in keys else {}
+        return {"type": f"{keys['type']}{bits}"} | sign
+
+    device, used = keys_of(device), keys_of(used)
+    values = read(np.round(1000 * SWING), device, used)
+    texts = list(misread("torque", Register(address=0, **used), "x", values))
+    assert len(texts) == bool(named)
+    assert all(named.format(bits=bits, sign=bits - 1) in text for text in texts)
 
 
 def test_too_few_values_show_nothing():

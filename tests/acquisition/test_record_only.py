@@ -587,7 +587,38 @@ def test_a_sign_that_is_misread_is_named(tmp_path, kind, negative, expected):
     path.write_text(text.replace(was, was.replace("int16", kind)))
     texts = findings_of(path, server)
     assert len(texts) == bool(expected)
-    assert all(expected in one and "torque leaps by" in one for one in texts)
+    assert all(expected in one and "torque: leaps by" in one for one in texts)
+
+
+@pytest.mark.parametrize(
+    ("keys", "middle", "expected"),
+    [
+        ('type = "uint16"', 0, 'read as large ones; set {}.type = "int16"'),
+        ('type = "int16"', 32768, '{}.type = "uint16" and offset = -32768'),
+        ('type = "uint16"', 32768, "if it stands for 0, set {}.offset = -32768"),
+        ('type = "int16"', 0, ""),
+        ('type = "uint16", offset = -32768', 32768, ""),
+    ],
+)
+def test_a_torque_that_counts_from_another_zero_is_named(tmp_path, keys, middle, expected):
+    """By the check and in the recording, which may be the first to see it change its sign."""
+
+    def answer(n, words):
+        torque = round(200.0 * np.sin(0.2 * words[0] + 0.1))
+        return [words[0], 500, (torque + middle) & 0xFFFF]
+
+    path, output = tmp_path / "bench.toml", tmp_path / "bench.parquet"
+    server, _ = a_device(answer)
+    text = BENCH.format(port=server.getsockname()[1], watchdog_s=1.0)
+    path.write_text(
+        text.replace('address = 2, type = "int16", scale = 0.1', f"address = 2, {keys}")
+    )
+    settings = RunSettings(name="one", run="exo_alone", purpose="train", duration_s=1.0)
+    with server:
+        record_only(path, settings, output, 100.0, ELBOW)
+        texts = misread_values(output, path) + findings_of(path, server)
+    assert len(texts) == 2 * bool(expected)
+    assert all(expected.format("map.drive.plc.read.torque") in text for text in texts)
 
 
 def test_a_torque_of_magnitude_and_sign_bit_is_recorded_and_has_no_findings(tmp_path):
@@ -648,6 +679,28 @@ def test_a_torque_that_is_cut_off_at_the_end_of_its_register_is_named(tmp_path, 
     assert len(texts) == len(findings) == (largest > 32768.0)
     for text, name in zip((*texts, *findings), ("elbow_torque_nm", "torque"), strict=False):
         assert re.search(rf"{name}: \d+ of \d+ values are at the end of their register", text)
+
+
+@pytest.mark.parametrize("run", ["exo_alone", "with_human"])
+@pytest.mark.parametrize("scale", [0.1, -0.1])
+def test_a_torque_of_the_wrong_sign_is_named_where_nobody_is_in_the_machine(tmp_path, run, scale):
+    """Friction consumes what a drive delivers; a person may drive the machine."""
+
+    def answer(n, words):
+        phase = 0.1 * words[0]
+        torque = round(200.0 * np.cos(phase) - 300.0 * np.sin(phase))
+        return [words[0], round(700.0 * np.sin(phase)) & 0xFFFF, torque & 0xFFFF]
+
+    server, _ = a_device(answer)
+    path, output = tmp_path / "bench.toml", tmp_path / "bench.parquet"
+    text = BENCH.format(port=server.getsockname()[1], watchdog_s=1.0)
+    path.write_text(text.replace("scale = 0.1", f"scale = {scale}"))
+    settings = RunSettings(name="one", run=run, purpose="train", duration_s=2.0)
+    with server:
+        record_only(path, settings, output, 100.0, ELBOW)
+    texts = misread_values(output, path)
+    assert len(texts) == (run == "exo_alone" and scale < 0.0)
+    assert all("the drives absorb" in text for text in texts)
 
 
 ENCODED = {

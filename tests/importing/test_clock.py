@@ -345,3 +345,36 @@ def test_fractions_without_leading_zeros_are_refused_as_that(imported, pendulum,
     outcome = imported(write_csv(pendulum.columns() | {"time": stamps}))
     assert outcome.code == 2
     assert "without their leading zeros" in outcome.err and "time.rate_hz" in outcome.err
+
+
+def time_code(frames, in_a_second, mark=":"):
+    """Return hours, minutes, seconds and frames."""
+    return [
+        f"10:{k // (60 * in_a_second):02d}:{k // in_a_second % 60:02d}{mark}{k % in_a_second:02d}"
+        for k in frames
+    ]
+
+
+@pytest.mark.parametrize(("in_a_second", "mark"), [(25, ":"), (30, ";"), (60, ".")])
+def test_frames_of_a_time_code_are_no_hundredths_of_a_second(
+    imported, pendulum, write_csv, in_a_second, mark
+):
+    """As cameras write them; several rows may have one frame."""
+    dates = MAP.replace('unit = "s"', 'unit = "iso8601"', 1)
+    for rows_a_frame in (1, 3):
+        stamps = time_code(np.arange(2000) // rows_a_frame, in_a_second, mark)
+        outcome = imported(write_csv(pendulum.columns() | {"time": stamps}), map_text=dates)
+        assert outcome.code == 2
+        assert f"count {in_a_second} frames" in outcome.err and "time.rate_hz" in outcome.err
+
+
+@pytest.mark.parametrize("every", [1, 2, 5, 20])
+def test_hundredths_of_a_second_are_no_frames(imported, pendulum, write_csv, every):
+    """Also where rows are lost now and then."""
+    dates = MAP.replace('unit = "s"', 'unit = "iso8601"', 1)
+    hundredths = every * np.delete(np.arange(2001), 77)
+    outcome = imported(
+        write_csv(pendulum.columns() | {"time": time_code(hundredths, 100)}), map_text=dates
+    )
+    assert outcome.code == 0
+    assert_allclose(outcome.recording().frame["time_s"], 0.01 * hundredths, atol=1e-9)

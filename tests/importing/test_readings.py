@@ -8,6 +8,9 @@ from numpy.testing import assert_allclose
 
 from pipelines.settings.units import UNITS
 from tests.importing.conftest import MAP
+from tests.importing.test_guess import guessed
+
+__all__ = ["guessed"]
 
 WRITTEN = [
     ("rad", 1.0, ""),
@@ -561,3 +564,104 @@ def test_rows_that_are_missing_do_not_hide_that_a_counter_wraps(imported, pendul
     counts = MAP.replace('unit = "rad"', 'unit = "counts", counts_per_turn = 376991', 1)
     outcome = imported(path, map_text=counts)
     assert "set wraps_at = 65536" in outcome.printed, outcome
+
+
+def test_a_torque_without_its_sign_is_named(imported, pendulum, write_csv):
+    """As torque meters log it that write the direction in words."""
+    words = np.where(pendulum.torque < 0.0, "CCW", "CW")
+    columns = pendulum.columns() | {"torque": np.abs(pendulum.torque), "direction": words}
+    outcome = imported(write_csv(columns))
+    assert outcome.code == 0
+    assert "pivot_torque_nm: turns round at 0 as a magnitude does" in outcome.printed
+    assert "its sign is missing" not in imported(write_csv(pendulum.columns())).printed
+
+
+def test_a_torque_whose_decimal_point_moves_is_named(imported, pendulum, write_csv):
+    torque = np.where(np.abs(pendulum.torque) < 0.5, 10.0 * pendulum.torque, pendulum.torque)
+    printed = imported(write_csv(pendulum.columns() | {"torque": torque})).printed
+    assert "pivot_torque_nm: leaps by a factor of ten, and back" in printed
+
+
+def test_a_torque_of_one_sign_that_only_touches_zero_lacks_none(imported, pendulum, write_csv):
+    """As that of a brake, or of a joint that always carries its load to one side."""
+    columns = pendulum.columns() | {"torque": 1.0 - np.cos(6.0 * pendulum.time)}
+    assert "its sign is missing" not in imported(write_csv(columns)).printed
+
+
+@pytest.mark.parametrize(
+    ("above", "key"),
+    [
+        ("Factor,1,2,1,0.5\nstate,time,angle,velocity,torque\n", "x,"),
+        ("# Scale: 1,2,1,0.5\n# time,angle,velocity,torque\n", ""),
+        ("key,time,angle,velocity,torque\nGain [-],1,2,1,0.5\nOffset,0,0,0,0\n", ","),
+    ],
+)
+def test_factors_above_the_rows_are_named_until_the_map_has_a_scale(
+    imported, guessed, pendulum, write_csv, above, key
+):
+    path = write_csv(pendulum.columns(), header=False)
+    rows = path.read_text().splitlines()
+    path.write_text(above + "".join(f"{key}{row}\n" for row in rows))
+    outcome = imported(path)
+    assert outcome.code == 0
+    assert len(outcome.recording().frame) == 2000
+    assert " 2 of 'angle'; taken to be in the values" in outcome.printed
+    assert " 0.5 of 'torque'" in outcome.printed
+    assert "'velocity'" not in outcome.printed and "Offset" not in outcome.printed
+    scaled = MAP.replace('"rad" }', '"rad", scale = 2.0 }').replace('m" }', 'm", scale = 1.0 }')
+    assert "the file says" not in imported(path, map_text=scaled).printed
+    _, doubts = guessed(path)
+    assert "the file says" in doubts["joint"]
+
+
+@pytest.mark.parametrize("name", ["node", "Serial No.", "axis_id", "Gerät"])
+def test_rows_of_several_machines_are_named(imported, pendulum, write_csv, name):
+    """Their clocks go on together, as those of two drives on one bus."""
+    labels = np.where(np.arange(2000) // 500 % 2, "B7", "A3")
+    outcome = imported(write_csv(pendulum.columns() | {name: labels}))
+    assert outcome.code == 0
+    assert f"'{name}' is A3 in 1 000 rows, B7 in 1 000 rows; all kept as one" in outcome.printed
+    outcome = imported(write_csv(pendulum.columns() | {name: labels[:1].repeat(2000)}))
+    assert "kept as one" not in outcome.printed
+
+
+def test_rows_whose_values_are_no_measurements_are_named(imported, pendulum, write_csv):
+    """A historian repeats the last value while the connection is lost."""
+    labels = np.where(np.arange(2000) % 500 < 20, "Bad", "Good")
+    outcome = imported(write_csv(pendulum.columns() | {"Angle.Quality": labels}))
+    assert outcome.code == 0
+    assert "'Angle.Quality' is Good in 1 920 rows, Bad in 80 rows; all kept" in outcome.printed
+
+
+@pytest.mark.parametrize("name", ["joint_speed", "axis_temperature", "motor", "leg_id_rms"])
+def test_a_quantity_of_a_machine_is_no_label_of_its_rows(imported, pendulum, write_csv, name):
+    outcome = imported(write_csv(pendulum.columns() | {name: np.arange(2000) % 3}))
+    assert f"'{name}'" not in outcome.printed
+
+
+@pytest.mark.parametrize(
+    ("first", "second", "later"),
+    [
+        (slice(0, None, 2), slice(1, None, 2), "0.5 of a row apart"),
+        (slice(0, 1000), slice(0, 1000), "0.0 of a row apart"),
+        (slice(0, 1000), slice(40, 1040), ""),
+    ],
+    ids=["two samples a row", "one column twice", "another motion"],
+)
+def test_joints_that_are_one_are_named(imported, pendulum, write_csv, first, second, later):
+    """A logger that sends packets writes several samples in a row, angle0 and angle1."""
+    columns = {"time": pendulum.time[first]}
+    text = MAP.split("[[joint]]")[0]
+    for k, rows in enumerate((first, second)):
+        noise = 1e-4 * np.random.default_rng(k).normal(size=1000)
+        columns |= {f"angle{k}": pendulum.angle[rows] + noise, f"torque{k}": pendulum.torque[rows]}
+        text += (
+            f'[[joint]]\nname = "joint{k}"\nangle = {{ column = "angle{k}", unit = "rad" }}\n'
+            f'torque = {{ column = "torque{k}", unit = "N·m" }}\n'
+        )
+    text += '[[recording]]\nname = "whole"\npurpose = "train"\n'
+    outcome = imported(write_csv(columns), map_text=text)
+    assert outcome.code == 0
+    expected = "joint1_angle_rad: is joint0_angle_rad, "
+    assert (expected in outcome.printed) == bool(later)
+    assert later in outcome.printed

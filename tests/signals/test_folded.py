@@ -36,10 +36,33 @@ def test_a_magnitude_is_named(noise, least, friction, sign):
     assert share(lambda rng: sign * np.abs(torque(rng, noise, friction))) >= least
 
 
+@pytest.mark.parametrize("noise", [0.0, 0.05])
+@pytest.mark.parametrize(
+    "sign",
+    [
+        lambda values: np.sign(np.gradient(values)),
+        lambda values: np.sign(np.roll(values, 10)),
+    ],
+    ids=["of its rate", "late"],
+)
+def test_a_magnitude_with_the_sign_of_something_else_is_named(noise, sign):
+    def channel(rng):
+        values = torque(rng)
+        noisy = np.round(values + rng.normal(0.0, noise, len(values)), 2)
+        return np.where(sign(values) < 0.0, -1.0, 1.0) * np.abs(noisy)
+
+    assert share(channel) >= 0.8
+
+
 @pytest.mark.parametrize(
     "channel",
     [
         lambda rng: torque(rng, 0.05),
+        lambda rng: torque(rng, 0.05, 2.0),
+        lambda rng: torque(rng, 0.5, 8.0),
+        lambda rng: torque(rng, 3.0),
+        lambda rng: np.round(torque(rng, 0.3)),
+        lambda rng: np.round(np.cumsum(rng.normal(0.0, 0.3, len(SECONDS))), 2),
         lambda rng: 20.0 + torque(rng, 0.05),
         lambda rng: np.maximum(torque(rng, 0.05), 0.0),
         lambda rng: np.maximum(torque(rng, 0.5), 0.0),
@@ -52,7 +75,8 @@ def test_a_magnitude_is_named(noise, least, friction, sign):
         lambda rng: np.zeros(len(SECONDS)),
     ],
     ids=[
-        *("with its sign", "above zero", "cut off at zero", "cut off, noisy"),
+        *("with its sign", "with friction", "with much friction", "mostly noise", "coarse"),
+        *("a random walk", "above zero", "cut off at zero", "cut off, noisy"),
         *("touching zero", "touching, some noise", "touching, noisy", "coarse at rest"),
         *("pulses", "no rows", "all zero"),
     ],

@@ -1,10 +1,7 @@
-"""Leaps of a value from reading to reading, by a turn or a power of two of counts."""
-
-from math import pi
-
-import numpy as np
+"""Leaps of a value from reading to reading of a device."""
 
 from pipelines.acquisition.check.probe import Series
+from pipelines.acquisition.leaps import leap
 
 
 def leap_of(series: Series, name: str, of_turn: bool = False) -> float | None:
@@ -19,21 +16,4 @@ def leap_of(series: Series, name: str, of_turn: bool = False) -> float | None:
     of_turn : bool
         Whether it may leap by a turn, too.
     """
-    register = series.block.registers[name]
-    if register.turn or len(series.fresh) < 2:
-        return None
-    per_count = abs(register.si[0])
-    counts = series.of(name)[series.fresh] / per_count
-    steps = np.abs(np.diff(counts))
-    # A leap is half of all that the value does; all else is small against it.
-    leaps = steps > 0.5 * np.ptp(counts)
-    if not leaps.any() or leaps.all():
-        return None
-    usual = float(steps[~leaps].max())
-    if usual > 0.125 * steps[leaps].min():
-        return None
-    turn = (2.0 * pi / per_count,) if of_turn else ()
-    for full in (*turn, *(2.0**bits for bits in range(8, 33))):
-        if (np.abs(steps[leaps] - full) <= 2.0 * usual + 1.0).all():
-            return full
-    return None
+    return leap(series.block.registers[name], series.of(name)[series.fresh], of_turn)

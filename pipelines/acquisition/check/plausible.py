@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from pipelines.acquisition.check.finding import Finding
 from pipelines.acquisition.check.interpretation import remedy
 from pipelines.acquisition.check.probe import Probe, Series
-from pipelines.acquisition.check.turns import check_signs, check_turns
+from pipelines.acquisition.check.turns import check_turns
 from pipelines.acquisition.check.words import check_words
 from pipelines.acquisition.machine.drive import Drive
 from pipelines.contracts.checks import LARGEST_ANGLE_RAD
@@ -115,10 +115,8 @@ def check_registers(
         expected = {} if turns else dict.fromkeys(("angle", "reference"), _ANYWHERE)
     yield from _check_counter_words(probe, series)
     findings = list(check_words(probe, series, order=isinstance(rig, RecordingRig)))
-    if isinstance(rig, RecordingRig):
-        if not any(one.quantity == "angle" for one in findings):
-            findings += check_turns(probe, series)
-        findings += check_signs(probe, series)
+    if isinstance(rig, RecordingRig) and not any(one.quantity == "angle" for one in findings):
+        findings += check_turns(probe, series)
     yield from findings
     misread = {finding.quantity for finding in findings}
     for name in series.block.names:

@@ -1,4 +1,4 @@
-"""Whether an angle starts again after a turn, or a sign is misread, which no limit shows."""
+"""Whether an angle starts again after a turn, which no limit shows."""
 
 from collections.abc import Iterator
 
@@ -26,35 +26,5 @@ def check_turns(probe: Probe, series: Series) -> Iterator[Finding]:
             f" turn; set {where}.wraps_at = {full:.10g}, and turns = true at the joint in"
             " [mechanism]",
             "angle",
-            is_explained=True,
-        )
-
-
-def check_signs(probe: Probe, series: Series) -> Iterator[Finding]:
-    """Yield a finding for each value of one register that leaps where it changes its sign.
-
-    Parameters
-    ----------
-    probe : Probe
-        A device that is only read.
-    series : Series
-        Repeated readings of its block.
-    """
-    for name, register in series.block.registers.items():
-        if name in ("sequence", "time", "angle", "reference", "status") or register.registers > 1:
-            continue
-        full, where = leap_of(series, name), f"{probe.map_path}.read.{name}"
-        if full == 2.0**16 and register.is_unsigned:
-            remedy = f'negative values are read as large ones; set {where}.type = "int16"'
-        elif full == 2.0**15:
-            remedy = (
-                f'it is a magnitude with a sign bit; set {where}.type = "uint16" and sign_bit = 15'
-            )
-        else:
-            continue
-        yield Finding(
-            probe.name,
-            f"{name} leaps by {full:.0f} counts where it changes its sign: {remedy}",
-            name,
             is_explained=True,
         )

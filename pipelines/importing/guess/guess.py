@@ -116,6 +116,10 @@ def propose(paths: Sequence[Path]) -> Proposal:
         proposal.doubt("joint", f"{rests}; with them, name their columns too")
     if not time.unit_sure and any("velocity" in joint.columns for joint in joints):
         proposal.doubt("joint.velocity.unit", "follows from the unit of time, which is unsure")
+    for name, text in source.scaling.items():
+        if name in used:
+            why = f"the file says {text} of {name!r}; if its values are without it, set scale, zero"
+            proposal.doubt("joint", why)
     _write_geometry(proposal, joints)
     _write_recordings(proposal, paths, [_period(path, join, time, joints, own) for path in paths])
     _write_unused(proposal, [name for name in source.names if name not in used], columns)

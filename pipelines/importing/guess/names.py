@@ -128,14 +128,14 @@ def meaning(name: str) -> Meaning:
     plain = TWIN.sub("", name)
     # The unit first: its letters would pass for words of the joint's name.
     in_name = unit_in(plain)
-    words = _split(in_name.rest if in_name else plain)
+    words = words_of(in_name.rest if in_name else plain)
     quantity = _quantity(set(words))
     # A letter or a short word may be part of the name, as the A of joint_A.
     if in_name and not (in_name.decides or _confirms(in_name, quantity, set(words))):
-        in_name, words = None, _split(plain)
+        in_name, words = None, words_of(plain)
         quantity = _quantity(set(words))
     if in_name is None and quantity in ("", "time") and (tick := tick_in(plain)):
-        in_name, words = tick, _split(tick.rest)
+        in_name, words = tick, words_of(tick.rest)
         quantity = "time"
     distinct = set(words) - _containers(plain)
     unit = None
@@ -175,7 +175,7 @@ def meaning(name: str) -> Meaning:
 def _containers(name: str) -> set[str]:
     """Return the words of a nested name that are only its container, as in ``state.q``."""
     outer, _, inner = name.replace("/", ".").rpartition(".")
-    return set(_split(outer)) & {"state", "status"} - set(_split(inner))
+    return set(words_of(outer)) & {"state", "status"} - set(words_of(inner))
 
 
 def in_counts(column: Meaning) -> Meaning | None:
@@ -183,7 +183,7 @@ def in_counts(column: Meaning) -> Meaning | None:
     in_name = unit_in(TWIN.sub("", column.column))
     if column.quantity or in_name is None or in_name.unit != "counts":
         return None
-    words = [word for word in _split(in_name.rest) if word not in SIGNS]
+    words = [word for word in words_of(in_name.rest) if word not in SIGNS]
     if set(words) & (SOMETHING_ELSE | TALLIES) or _quantity(set(words)):
         return None
     return replace(column, quantity="angle", joint=_joint(words), unit="counts")
@@ -224,7 +224,7 @@ def _confirms(in_name: UnitInName, quantity: str, words: set[str]) -> bool:
     return in_name.quantity == ("angle" if words & COMMANDED and not quantity else quantity)
 
 
-def _split(name: str) -> list[str]:
+def words_of(name: str) -> list[str]:
     """Return the words of a name in lower case, with compounds like Motordrehzahl split."""
     # Umlauts are spelled out before accents are dropped: ü is ue in German words, é is e.
     plain = BRACKETS.sub(_words_in, name).translate(UMLAUTS)

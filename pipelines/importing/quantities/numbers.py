@@ -106,6 +106,38 @@ def whole_nanoseconds(values: NDArray, written: str | None = None) -> NDArray:
     return _nanoseconds(_in_other_words(text) if dates.isna().all() else dates)
 
 
+def frames_in_a_second(values: NDArray) -> int | None:
+    """Return how many frames a time code counts in each second; None if it is no time code.
+
+    Hours, minutes, seconds and frames, as 10:15:01:24, look like hundredths of a second. Their last
+    two digits start over before they come to 99, and leave the rest of each second empty.
+
+    Parameters
+    ----------
+    values : (n,) array
+        Stamps as the file has them.
+    """
+    # Seconds that start over by chance, and the share of hundredths below which they are frames:
+    # cameras have up to 72 frames a second.
+    by_chance, full = 2, 90
+    if values.dtype.kind in "iufmM":
+        return None
+    parts = pd.Series(values).astype("string").str.extract(r"\d:(\d\d)[:;.](\d\d)\s*$").dropna()
+    seconds, frames = (parts[k].astype(int).to_numpy() for k in (0, 1))
+    if len(parts) < 0.99 * len(values):
+        return None
+    # Several rows may have one frame.
+    new = (np.diff(seconds) != 0) | (np.diff(frames) != 0)
+    starts, steps = np.diff(seconds)[new] != 0, np.diff(frames)[new]
+    if np.count_nonzero(starts) <= by_chance or not np.any(~starts):
+        return None
+    step = int(np.median(steps[~starts]))
+    count = int(frames.max()) + step
+    goes_on = np.mean(steps[~starts] == step) > 0.9
+    starts_over = np.mean(steps[starts] == step - count) > 0.9
+    return count if step > 0 and count < full and goes_on and starts_over else None
+
+
 def _minutes(text: pd.Series) -> pd.Series:
     """Return minutes and seconds (n,) as dates; without a fraction they may be hours."""
     parts = text.str.extract(r"^(\d{1,4}):([0-5]\d\.\d{1,9})$").astype("string")

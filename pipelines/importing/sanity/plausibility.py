@@ -1,6 +1,7 @@
 """Report implausible values in an imported recording, without correcting them."""
 
 from collections.abc import Iterator, Mapping, Sequence
+from itertools import combinations
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,12 +10,16 @@ from pipelines.contracts.checks import LARGEST_ANGLE_RAD
 from pipelines.contracts.joints import in_words
 from pipelines.errors import InputError
 from pipelines.importing.finding import Finding, counted
-from pipelines.importing.quantities.consistency import MOST, SPAN, integral_agreement, whole_rows
+from pipelines.importing.quantities.consistency import MOST, integral_agreement, whole_rows
 from pipelines.importing.quantities.wraparound import fill_value
 from pipelines.mechanics.geometry import Geometry
 from pipelines.mechanics.machine import known_in_words, machine_of, mechanisms_of
 from pipelines.mechanics.remedies import AT_REST
 from pipelines.settings.import_map import ImportMap, JointSettings
+from pipelines.signals.folded import is_folded
+from pipelines.signals.held import new_values
+from pipelines.signals.power import GIVES_BACK, mean_power
+from pipelines.signals.rescaled import is_rescaled
 
 STRONGEST = {"torque": 1e3, "force": 1e5}
 """N·m and N; drives of legs, arms and robots deliver less, so more is mostly in another unit."""
@@ -65,6 +70,9 @@ def check(columns: Mapping[str, NDArray], settings: ImportMap) -> Iterator[Findi
         yield from _turns_on(columns, joint)
         yield from _slips(columns, joint)
         yield from _too_strong(columns, joint)
+        yield from _rescaled(columns, joint)
+        yield from _unsigned(columns, joint)
+    yield from _copies(columns, settings.joint)
     joints = [joint.joint for joint in settings.joint]
     # Drives whose torque was not measured may do the work that the others absorb.
     if all(joint.is_measured for joint in joints):
@@ -178,6 +186,45 @@ def _too_strong(columns: Mapping[str, NDArray], joint: JointSettings) -> Iterato
         )
 
 
+def _copies(columns: Mapping[str, NDArray], joints: Sequence[JointSettings]) -> Iterator[Finding]:
+    """Report joints whose angles are those of another, as of several samples in a row."""
+    # Share of a motion by which the angles of two joints differ at least, as an rms value.
+    least = 0.005
+    names = [joint.joint.column("angle") for joint in joints]
+    for one, other in combinations(names, 2):
+        values, copy = (columns[name] - np.mean(columns[name]) for name in (one, other))
+        motion, moves = float(values @ values), np.diff(values)
+        if motion == 0.0:
+            continue
+        # Another sample of a row is later by a share of the time to the next row.
+        apart = (copy - values)[:-1]
+        share = float(apart @ moves) / float(moves @ moves)
+        rest = apart - share * moves
+        if abs(share) < 1.0 and float(rest @ rest) < least**2 * motion:
+            seen = f"is {one}, {abs(share):.1f} of a row apart"
+            action = "kept; if both are one joint's, give each sample a row, and leave one out"
+            yield Finding(other, seen, action)
+
+
+def _rescaled(columns: Mapping[str, NDArray], joint: JointSettings) -> Iterator[Finding]:
+    """Report a torque that was logged with another factor now and then."""
+    for quantity in _torque_of(joint):
+        name = joint.joint.column(quantity)
+        if is_rescaled(columns[name][new_values(columns[name])]):
+            seen = "leaps by a factor of ten, and back, as a display whose decimal point moves"
+            yield Finding(name, seen, "kept; log it with one decimal point")
+
+
+def _unsigned(columns: Mapping[str, NDArray], joint: JointSettings) -> Iterator[Finding]:
+    """Report a torque without its sign, which may stand in another column."""
+    for quantity in _torque_of(joint):
+        name = joint.joint.column(quantity)
+        if is_folded(columns[name][new_values(columns[name])]):
+            seen = "turns round at 0 as a magnitude does, so its sign is missing or wrong"
+            action = "kept; where another column has it, let an expression multiply both"
+            yield Finding(name, seen, action)
+
+
 def _velocity(columns: Mapping[str, NDArray], joint: JointSettings) -> Iterator[Finding]:
     # Share of the variance that velocity and angle must share before their slope is judged.
     least_explained = 0.5
@@ -198,27 +245,15 @@ def _velocity(columns: Mapping[str, NDArray], joint: JointSettings) -> Iterator[
 
 def _power(columns: Mapping[str, NDArray], joints: Sequence[JointSettings]) -> Iterator[Finding]:
     """Report drives that brake on average; a single one may, where another one moves it."""
-    # Share of the mean magnitude of power that the drives may absorb on average.
-    gives_back = 0.2
     powers = [_mean_power(columns, joint) for joint in joints]
     # Over all joints, because one joint's motion can drive another one's motor.
     mean, size = (sum(values) for values in zip(*powers, strict=True))
-    if mean < -gives_back * size:
+    if mean < -GIVES_BACK * size:
         seen = f"the drives absorb {-mean:.3g} W on average, but friction must consume power"
         yield Finding("torque", seen, "kept; check the signs of angles and torques")
 
 
 def _mean_power(columns: Mapping[str, NDArray], joint: JointSettings) -> tuple[float, float]:
-    """Return the mean and the mean magnitude of a drive's power, W; zeros for a short log."""
-    # The energy that a drive delivers between two equal states is lost to friction. The mean is
-    # thus positive where the signs of angle and torque agree.
+    """Return the mean and the mean magnitude of a drive's power, W."""
     names = [joint.joint.column(quantity) for quantity in ("angle", "torque")]
-    time_s, angle, torque = whole_rows(columns["time_s"], *(columns[name] for name in names))
-    if len(time_s) < 5 * SPAN:
-        return 0.0, 0.0
-    velocity = (angle[SPAN:] - angle[:-SPAN]) / (time_s[SPAN:] - time_s[:-SPAN])
-    # The mean torque over the span of the velocity: a shift in time between both would change their
-    # product.
-    averaged = np.convolve(torque, np.ones(SPAN + 1) / (SPAN + 1), "valid")
-    power = averaged * velocity
-    return float(np.mean(power)), float(np.mean(np.abs(power)))
+    return mean_power(*whole_rows(columns["time_s"], *(columns[name] for name in names)))

@@ -9,7 +9,13 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 from pipelines.errors import InputError
-from pipelines.importing.sources.header import Header, header, looks_like_number
+from pipelines.importing.sources.header import (
+    Header,
+    header,
+    is_scaling,
+    looks_like_number,
+    scaling_of,
+)
 from pipelines.importing.sources.source import numbered_twins
 from pipelines.settings.base import repeated
 from pipelines.settings.import_map import SourceSettings
@@ -53,6 +59,8 @@ class Dialect:
     """Words above each column, by which a header that comes again is recognised."""
     units: Mapping[str, str]
     clocks: Mapping[str, str]
+    scaling: Mapping[str, str]
+    """Factors and offsets that lines above the rows give to columns."""
     notes: tuple[str, ...]
     remark: str
     """How the names follow from a header that does not fit; empty where it does."""
@@ -138,6 +146,7 @@ def find_dialect(start: bytes, whole: bool, settings: SourceSettings) -> Dialect
         table.heads(below),
         named.units,
         {apart[k]: apart[clock] for k, clock in named.clocks.items()},
+        {apart[k]: text for k, text in table.scaling(below).items()},
         (*notes, remark) if remark else tuple(notes),
         remark,
     )
@@ -221,6 +230,10 @@ class _Table:
             self._above(lines), self.width, counts_rows, may_be_longer=self.delimiter != " "
         )
 
+    def scaling(self, lines: Sequence[str]) -> dict[int, str]:
+        """Return the factors and offsets above the rows, by the places of their columns."""
+        return scaling_of(self._above(lines), self.width)
+
     def heads(self, lines: Sequence[str]) -> tuple[frozenset[str], ...]:
         """Return the words above each column."""
         above = self._above(lines)
@@ -259,6 +272,7 @@ def _tables(
         # Without it every line is one field.
         if any(delimiter in line or (delimiter == " " and "\t" in line) for _, line in filled):
             rows = [(k, _fields(line, delimiter)) for k, line in filled]
+            rows = [(k, fields) for k, fields in rows if not is_scaling(fields)]
             # A comma may separate fields and be the decimal point of quoted numbers.
             tables += [_table(rows, delimiter, one, marks) for one in settings.decimal or ".,"]
     return [table for table in tables if table is not None]

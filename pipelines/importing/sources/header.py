@@ -8,6 +8,14 @@ from pipelines.settings.units import unit_named
 
 UNIT = r"[\[(].*[\])]|[-\w°µ/·*%.²]{1,5}"
 """Pattern of a possible unknown unit: in brackets, or short."""
+_OF_FACTORS = (
+    "factor factors scale scaling scalefactor gain gains multiplier slope sensitivity resolution",
+    "faktor faktoren skalierung skalierungsfaktor verstärkung empfindlichkeit steigung auflösung",
+    "facteur échelle sensibilité",
+)
+FACTORS = frozenset(word for words in _OF_FACTORS for word in words.split())
+OFFSETS = frozenset({"offset", "offsets", "bias", "nullpunkt", "décalage"})
+"""Words that begin a line of numbers by which the values below may have to be scaled."""
 Line = Sequence[str]
 
 
@@ -22,6 +30,48 @@ class Header:
     """Place of the clock of each column, where the names show several clocks."""
     remark: str = ""
     """How the names follow from lines that do not fit the rows."""
+    scaling: dict[int, str] = field(default_factory=dict)
+    """Factors and offsets that a line gives to columns, by their places."""
+
+
+def is_scaling(line: Line) -> bool:
+    """Return whether a line has factors or offsets of the columns, not a row of their values."""
+    return bool(line) and _key(line[0]) in FACTORS | OFFSETS and len(line) > 1
+
+
+def _key(text: str) -> str:
+    """Return the word that begins a line, without marks and a unit."""
+    return re.sub(r"[\[(].*|[:=].*", "", text).replace(" ", "").replace("_", "").casefold()
+
+
+def scaling_of(above: Sequence[Line], width: int) -> dict[int, str]:
+    """Return the factors other than 1 and offsets other than 0 of columns, by their places.
+
+    Parameters
+    ----------
+    above : sequence of sequences of str
+        Fields of the lines above the rows, without marks of comments.
+    width : int
+        Fields of a row.
+    """
+    scaling: dict[int, str] = {}
+    for line in above:
+        stripped = _stripped(line)
+        if not is_scaling(stripped) or len(stripped) not in (width, width + 1):
+            continue
+        # A line may have its key before the first column, or in its place.
+        for k, text in enumerate(stripped[1:], 1 if len(stripped) == width else 0):
+            neutral = 1.0 if _key(line[0]) in FACTORS else 0.0
+            if looks_like_number(text) and not _is(text, neutral):
+                scaling[k] = ", ".join(filter(None, (scaling.get(k), f"{line[0].strip()} {text}")))
+    return scaling
+
+
+def _is(text: str, number: float) -> bool:
+    try:
+        return float(text.replace(",", ".")) == number
+    except ValueError:  # marks between thousands
+        return False
 
 
 def header(

@@ -104,6 +104,7 @@ def joined(sources: Sequence[Source], clock: str, others: Collection[str] = ()) 
     places: dict[str, tuple[Source, str]] = {}
     clocks: dict[str, str] = {}
     units: dict[str, str] = {}
+    scaling: dict[str, str] = {}
     of_files = []
     for number, source in enumerate(sources, 1):
         called = {name: f"{name}#{number}" if name in places else name for name in source.names}
@@ -113,6 +114,7 @@ def joined(sources: Sequence[Source], clock: str, others: Collection[str] = ()) 
         of_files.append(of_file)
         places |= {called[name]: (source, name) for name in source.names}
         units |= {called[name]: unit for name, unit in source.units.items()}
+        scaling |= {called[name]: text for name, text in source.scaling.items()}
         clocks |= {name: of_file for name in called.values() if name != of_file}
         clocks |= {called[name]: called[own] for name, own in source.clocks.items()}
 
@@ -136,6 +138,7 @@ def joined(sources: Sequence[Source], clock: str, others: Collection[str] = ()) 
         (*first.notes, remark),
         units=units,
         clocks=clocks,
+        scaling=scaling,
         remarks=(*(remark for one in sources for remark in one.remarks), remark),
     )
 

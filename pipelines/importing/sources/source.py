@@ -27,6 +27,8 @@ class Source:
     """Units that the file gives to columns outside of their names."""
     clocks: Mapping[str, str] = field(default_factory=dict)
     """Clocks of columns, where the file says which was sampled by which."""
+    scaling: Mapping[str, str] = field(default_factory=dict)
+    """Factors and offsets that the file gives to columns, but that may be in their values."""
     remarks: tuple[str, ...] = ()
     """What was not as it should be, for the user."""
     aliases: Mapping[str, str] = field(default_factory=dict)

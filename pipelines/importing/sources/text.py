@@ -62,6 +62,7 @@ def _source(path: Path, format: str, dialect: Dialect, content: Callable[[], Any
         dialect.notes,
         units=dialect.units,
         clocks=dialect.clocks,
+        scaling=dialect.scaling,
         remarks=(dialect.remark,) if dialect.remark else (),
     )
 

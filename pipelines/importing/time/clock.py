@@ -11,7 +11,7 @@ from scipy.ndimage import uniform_filter1d
 
 from pipelines.errors import InputError, SettingsError
 from pipelines.importing.finding import Finding, Note, counted, noting, unnoted
-from pipelines.importing.quantities.numbers import numbers, whole_nanoseconds
+from pipelines.importing.quantities.numbers import frames_in_a_second, numbers, whole_nanoseconds
 from pipelines.settings.import_map import TimeSettings
 from pipelines.settings.units import UNITS, unit_named
 from pipelines.signals.sampling import local_period, missing_samples, sample_rate, uneven_share
@@ -175,6 +175,12 @@ def _written(
         raw = np.array([f"{day} {time}" for day, time in zip(days, plus, strict=True)], object)
     if settings.format is None:
         _check_unit(raw, column, settings.unit, key)
+    frames = frames_in_a_second(raw)
+    if frames is not None:
+        raise InputError(
+            f"{column!r} has a time code: its last digits count {frames} frames in each second."
+            " Where rows are uniform, set time.rate_hz in place of time.column"
+        )
     values = whole_nanoseconds(raw, settings.format)
     if len(raw) and not np.isfinite(values).any():
         example = " such as 2026-01-31 12:00:00.125" if settings.format is None else ""

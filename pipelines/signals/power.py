@@ -1,0 +1,34 @@
+"""The mean power of a drive, which shows whether its angle and torque have the same sign."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+SPAN = 20
+"""Samples over which a velocity is taken: long against noise, short against a motion."""
+GIVES_BACK = 0.2
+"""Share of the mean magnitude of power that drives may absorb on average."""
+
+
+def mean_power(time_s: NDArray, angle: NDArray, torque: NDArray) -> tuple[float, float]:
+    """Return the mean and the mean magnitude of a drive's power, W; zeros for a short recording.
+
+    The energy that a drive delivers between two equal states is lost to friction. The mean is thus
+    positive where the signs of angle and torque agree.
+
+    Parameters
+    ----------
+    time_s : (n,) array
+        Times, s.
+    angle : (n,) array
+        Angle, rad, or position, m.
+    torque : (n,) array
+        Torque, N·m, or force, N.
+    """
+    if len(time_s) < 5 * SPAN:
+        return 0.0, 0.0
+    velocity = (angle[SPAN:] - angle[:-SPAN]) / (time_s[SPAN:] - time_s[:-SPAN])
+    # The mean torque over the span of the velocity: a shift in time between both would change their
+    # product.
+    averaged = np.convolve(torque, np.ones(SPAN + 1) / (SPAN + 1), "valid")
+    power = averaged * velocity
+    return float(np.mean(power)), float(np.mean(np.abs(power)))
