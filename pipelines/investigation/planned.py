@@ -14,6 +14,7 @@ from pipelines.diagnosis.evidence.block_rate import at_block_rate
 from pipelines.diagnosis.evidence.known_effects import known_effects
 from pipelines.diagnosis.evidence.observed_run import observe
 from pipelines.effects.effect import Family
+from pipelines.errors import InputError
 from pipelines.investigation.rivals import Rival
 from pipelines.mechanics.trajectory import Trajectory
 from pipelines.settings.design import DesignSettings
@@ -40,9 +41,15 @@ class PlannedRuns:
         ------
         ContractError
             Where its verdict is damaged.
+        InputError
+            Where it is of another machine than the leg.
         """
         verdict = read(folder / "verdict.json")
         noise = verdict.noise_floor_nm
+        if set(noise) != {"hip", "knee"}:
+            raise InputError(
+                f"{folder}: its verdict is of the joints {', '.join(noise)}, expected hip and knee"
+            )
         return replace(self, kinds=tuple(verdict.runs), noise_nm=(noise["hip"], noise["knee"]))
 
     def problem(self, trajectory: Trajectory, rivals: Sequence[Rival]) -> DetectionProblem:

@@ -1,7 +1,7 @@
 """Rival causes: those between which an experiment is to decide."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -15,9 +15,9 @@ from pipelines.diagnosis.detectability.detection_problem import DetectionProblem
 from pipelines.diagnosis.detectability.directions import bend, direction_of, orthonormal
 from pipelines.diagnosis.detectability.shapes import shapes_of
 from pipelines.effects import Effect
-from pipelines.errors import InputError
+from pipelines.errors import InputError, about
 from pipelines.mechanics.machine import Machine
-from pipelines.model import BASELINE
+from pipelines.model import BASELINE, Term, term_from
 from pipelines.wording.label import effect_at
 
 SETTING = "--separate"
@@ -30,10 +30,8 @@ class Rival:
     effect: Effect
     probability: float
     """Of the rivals together one."""
-    size: float | None = None
-    """Fitted first amplitude, in its unit."""
-    shape: tuple[float, ...] | None = None
-    """Fitted shape."""
+    term: Term | None = None
+    """As a diagnosis fitted it."""
 
     @property
     def label(self) -> str:
@@ -132,23 +130,14 @@ def rivals_in_verdict(folder: Path, machine: Machine) -> list[Rival]:
         for cause in verdict.causes
         if not cause.per_run
     }
-    return [
-        _with_fitted(
-            Rival(effect_at(one.label, machine, _is_cause, str(folder)), one.probability / total),
-            fitted.get(one.label, {}),
-        )
-        for one in open_ones
-    ]
-
-
-def _with_fitted(rival: Rival, values: dict[str, float]) -> Rival:
-    """Return a rival with its fitted values, if there are any."""
-    if not values:
-        return rival
-    effect = rival.effect
-    size = abs(values[effect.linear[0].name]) if effect.linear else None
-    shape = tuple(values[p.name] for p in effect.shape) if effect.shape else None
-    return replace(rival, size=size, shape=shape)
+    rivals = []
+    for one in open_ones:
+        effect = effect_at(one.label, machine, _is_cause, str(folder))
+        values = fitted.get(one.label)
+        with about(folder / "verdict.json"):
+            term = term_from(effect, values) if values else None
+        rivals.append(Rival(term.effect if term else effect, one.probability / total, term))
+    return rivals
 
 
 def _is_cause(effect: type[Effect]) -> bool:
@@ -179,26 +168,28 @@ def sized(rivals: Sequence[Rival], problem: DetectionProblem) -> list[SizedRival
                 f"{SETTING}: {rival.label} cannot show in planned runs, which have no"
                 " temperatures; leave it out"
             )
-    fitted = next((_fitted(rival, problem) for rival in rivals if _is_fitted(rival)), None)
+    fitted = next((_length(rival.term, problem) for rival in rivals if rival.term), None)
     return [_sized(rival, problem, fitted) for rival in rivals]
 
 
-def _is_fitted(rival: Rival) -> bool:
-    return rival.size is not None or rival.shape is not None
+def _length(term: Term, problem: DetectionProblem) -> float:
+    """Return the length of a fitted term's torque in the rows of a problem."""
+    candidate = _candidate(term, problem)
+    if candidate.transforms_motion:
+        return float(np.linalg.norm(Appearance.of(candidate, problem).torque))
+    columns = (torque_columns(candidate, r, run) for r, run in enumerate(problem.runs))
+    return float(np.linalg.norm(problem.remainder([c @ term.linear[:, None] for c in columns])))
 
 
-def _fitted(rival: Rival, problem: DetectionProblem) -> float:
-    """Return the length of a fitted rival's torque in the rows of a problem."""
-    candidate = Candidate(rival.effect, (rival.shape or (),) * len(problem.runs))
-    torque = Appearance.of(candidate, problem).torque
-    return (1.0 if rival.size is None else rival.size) * float(np.linalg.norm(torque))
+def _candidate(term: Term, problem: DetectionProblem) -> Candidate:
+    return Candidate(term.effect, (tuple(term.shape.tolist()),) * len(problem.runs))
 
 
 def _sized(rival: Rival, problem: DetectionProblem, fitted: float | None) -> SizedRival:
     grid = list(shapes_of(rival.effect, problem.runs))
     own = grid
-    if rival.shape is not None:
-        own = [Candidate(rival.effect, (rival.shape,) * len(problem.runs))]
+    if rival.term is not None:
+        own = [_candidate(rival.term, problem)]
         grid = [*own, *grid]
     truths = ((candidate, _amplitude(candidate, problem, fitted)) for candidate in own)
     # A shape that these runs do not show has no amplitude.

@@ -1,21 +1,32 @@
 """Excitations that decide between causes: what they predict, what they gain, what they refuse."""
 
+import json
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
+from pipelines.contracts.verdict import read
 from pipelines.design.excitation import design
 from pipelines.errors import InputError, NotIdentifiable
 from pipelines.investigation.planned import PlannedRuns
-from pipelines.investigation.rivals import Appearance, Rival, SizedRival, rivals_named, sized
+from pipelines.investigation.rivals import (
+    Appearance,
+    Rival,
+    SizedRival,
+    rivals_in_verdict,
+    rivals_named,
+    sized,
+)
 from pipelines.investigation.separating_design import separating_design, separation
 from pipelines.investigation.separation import DECIDED
 from pipelines.mechanics.geometry import Geometry
 from pipelines.mechanics.limits import margins
 from pipelines.mechanics.machine import THE_LEG
+from pipelines.model import Term
 from pipelines.settings.design import DesignSettings
 from pipelines.settings.rig.plant import PlantSettings
+from tests.report.sessions import AXIS, decision_of, write_verdict
 
 QUICK = DesignSettings(harmonics=3, particles=24, iterations=50)
 RUNS = PlannedRuns(QUICK, PlantSettings())
@@ -122,9 +133,43 @@ def test_causes_that_planned_runs_cannot_show_are_refused(usual):
 
 def test_a_tie_of_a_fitted_cause_makes_its_torque(usual):
     spring, inertia = named(*EASY)
-    fitted = Rival(spring.effect, 0.6, size=7.0)
+    fitted = Rival(spring.effect, 0.6, Term(spring.effect, np.array([7.0, 0.0])))
     problem = RUNS.problem(usual, [fitted, inertia])
     truths = [one.truths[0] for one in sized([fitted, inertia], problem)]
     lengths = [a * np.linalg.norm(Appearance.of(one, problem).torque) for one, a in truths]
     assert lengths[1] == pytest.approx(lengths[0])
-    assert truths[0][1] == pytest.approx(7.0)
+    assert truths[0][1] >= 7.0, "its preload was no torque that the baseline leaves"
+
+
+def test_a_verdict_s_ties_are_rivals_with_its_probabilities_and_noise(tmp_path):
+    write_verdict(tmp_path, **decision_of())
+    folder = tmp_path / "diagnosed"
+    document = json.loads((folder / "verdict.json").read_text())
+    amplitude = {"value": 1.5, "unit": "N·m", "ci95": [1.0, 2.0]}
+    document["causes"][0]["parameters"] = [
+        {**amplitude, "name": "amplitude"},
+        {**amplitude, "name": "cycles_per_turn", "value": 9.0, "unit": "1/turn"},
+        {**amplitude, "name": "phase", "value": 0.4, "unit": "rad"},
+    ]
+    (folder / "verdict.json").write_text(json.dumps(document))
+    found = read(folder / "verdict.json")
+    rivals = rivals_in_verdict(folder, THE_LEG)
+    assert {one.label: one.probability for one in rivals} == pytest.approx(
+        {"cogging@knee": 2.0 / 3.0, "parallel_spring@knee": 1.0 / 3.0}
+    )
+    # The verdict gives an amplitude and a phase, the fit has a sine and a cosine.
+    assert np.linalg.norm(rivals[0].term.linear) == pytest.approx(1.5)
+    assert rivals[0].term.shape == pytest.approx([9.0])
+    assert rivals[1].term is None
+    planned = RUNS.as_in_verdict(folder)
+    assert planned.noise_nm == (found.noise_floor_nm["hip"], found.noise_floor_nm["knee"])
+    assert planned.kinds == tuple(found.runs)
+
+
+def test_a_verdict_without_a_choice_or_of_another_machine_is_refused(tmp_path):
+    write_verdict(tmp_path, **decision_of(ties=()))
+    with pytest.raises(InputError, match="leaves no choice of causes"):
+        rivals_in_verdict(tmp_path / "diagnosed", THE_LEG)
+    write_verdict(tmp_path, AXIS, **decision_of(AXIS))
+    with pytest.raises(InputError, match="expected hip and knee"):
+        RUNS.as_in_verdict(tmp_path / "diagnosed")
