@@ -1,6 +1,6 @@
 """Propose a map for logs, with the reason for each line."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -95,15 +95,7 @@ def propose(paths: Sequence[Path]) -> Proposal:
     clock_s, time = time.count_s, settled(time, joints, of_run, run.time_s)
     run = replace(run, time_s=run.time_s * (time.count_s / clock_s))
     proposal = Proposal()
-    proposal.remark(
-        f"A map for {', '.join(path.name for path in paths)}, proposed by `exoid import --guess`."
-    )
-    proposal.remark("Check values that are UNSURE. FILL IN values that no log holds.")
-    for note in source.notes:
-        proposal.remark(f"Read as {source.format}: {note}.")
-    if join is not None:
-        proposal.table("[source]", "source")
-        proposal.key("join", list(join.patterns), "files of one run; their columns differ")
+    _write_source(proposal, paths, source, join)
     joints, resting = moving(joints, of_run)
     write_time(proposal, time, [name for joint in joints for name in _held(joint, of_run)])
     used = {*time.columns}
@@ -116,14 +108,33 @@ def propose(paths: Sequence[Path]) -> Proposal:
         proposal.doubt("joint", f"{rests}; with them, name their columns too")
     if not time.unit_sure and any("velocity" in joint.columns for joint in joints):
         proposal.doubt("joint.velocity.unit", "follows from the unit of time, which is unsure")
-    for name, text in source.scaling.items():
-        if name in used:
-            why = f"the file says {text} of {name!r}; if its values are without it, set scale, zero"
-            proposal.doubt("joint", why)
+    _doubt_scales(proposal, source, used)
     _write_geometry(proposal, joints)
     _write_recordings(proposal, paths, [_period(path, join, time, joints, own) for path in paths])
     _write_unused(proposal, [name for name in source.names if name not in used], columns)
     return proposal
+
+
+def _write_source(
+    proposal: Proposal, paths: Sequence[Path], source: Source, join: Join | None
+) -> None:
+    """Write what the map is for, and how the logs are read."""
+    logs = ", ".join(path.name for path in paths)
+    proposal.remark(f"A map for {logs}, proposed by `exoid import --guess`.")
+    proposal.remark("Check values that are UNSURE. FILL IN values that no log holds.")
+    for note in source.notes:
+        proposal.remark(f"Read as {source.format}: {note}.")
+    if join is not None:
+        proposal.table("[source]", "source")
+        proposal.key("join", list(join.patterns), "files of one run; their columns differ")
+
+
+def _doubt_scales(proposal: Proposal, source: Source, used: Collection[str]) -> None:
+    """Doubt the scales of columns of which the file has a factor or an offset."""
+    for name, text in source.scaling.items():
+        if name in used:
+            why = f"the file says {text} of {name!r}; if its values are without it, set scale, zero"
+            proposal.doubt("joint", why)
 
 
 def _held(joint: JointColumns, columns: Mapping[str, NDArray]) -> list[str]:
