@@ -25,7 +25,7 @@ def design(
     context: typer.Context,
     causes: Annotated[
         list[str] | None,
-        typer.Argument(metavar="[CAUSE]...", help="With --separate: effect@joint, two or more."),
+        typer.Argument(metavar="CAUSE", help="With --separate: effect@joint, two or more."),
     ] = None,
     output: Annotated[
         Path | None, output_option("The trajectory/1 file to write.", "trajectory.parquet")
