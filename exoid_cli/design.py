@@ -7,12 +7,17 @@ import typer
 
 from exoid_cli.console import console
 from exoid_cli.experiment_folder import (
-    in_experiment_folder,
     open_experiment,
     settings_in_force,
 )
 from exoid_cli.options import AgainOption, ConfigOption, output_option
-from exoid_cli.separate import Question, question_of, show_separation
+from exoid_cli.separate import (
+    Question,
+    last_excitation,
+    question_of,
+    show_separation,
+    write_excitation,
+)
 from exoid_cli.stage_runner import run_stages
 
 if TYPE_CHECKING:
@@ -97,7 +102,7 @@ def design(
     if evaluate:
         _evaluate(evaluate, settings, geometry, question)
     elif output and question:
-        last = _last_excitation(config, settings, geometry)
+        last = last_excitation(config, settings, geometry)
         _separate(output, question, geometry, last, experiment.sections("mechanism"))
     elif output:
         _design(output, settings, geometry, experiment.sections("mechanism"))
@@ -124,18 +129,6 @@ def _evaluate(file: Path, settings: Any, geometry: Any, question: "Question | No
     console.say(f"\n{file}: {settings.criterion} {result.value(settings.criterion):.4g}")
 
 
-def _last_excitation(config: Path | None, settings: Any, geometry: Any) -> "tuple[str, Trajectory]":
-    """Return the experiment's excitation, else the one that its settings give, and its name."""
-    from pipelines.design.excitation import design
-    from pipelines.mechanics.trajectory import read_trajectory
-
-    if config is not None or in_experiment_folder():
-        file = open_experiment(config).step("design").target
-        if file.is_file():
-            return str(file), read_trajectory(file)
-    return f"the excitation of {settings.criterion}", design(settings, geometry).trajectory
-
-
 def _separate(
     output: Path,
     question: "Question",
@@ -143,15 +136,12 @@ def _separate(
     last: "tuple[str, Trajectory]",
     mechanism: dict[str, Any],
 ) -> None:
-    from pipelines.contracts import TRAJECTORY, describe
     from pipelines.investigation.separating_design import separating_design
 
     rivals, runs = question
     with console.progress("designing", total=1.0) as report:
         result = separating_design(rivals, runs, geometry, last[1], report)
-    settings = {"design": runs.settings.model_dump(mode="json"), "geometry": vars(geometry)}
-    metadata = result.metadata() | describe(config=settings | mechanism)
-    TRAJECTORY.write(output, result.design.frame(), metadata)
+    write_excitation(output, result, geometry, mechanism)
     _warn_of_cut(result.design)
     console.emit({"file": str(output), **result.metadata()})
     _show(str(output), result.design.quality)

@@ -1,15 +1,18 @@
-"""``exoid design --separate`` and ``--from``: the excitation that decides between causes."""
+"""What ``exoid design --separate`` and ``exoid next`` share: rival causes, and what they show."""
 
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from exoid_cli.console import console
+from exoid_cli.experiment_folder import in_experiment_folder, open_experiment
 
 if TYPE_CHECKING:
     from pipelines.investigation.planned import PlannedRuns
     from pipelines.investigation.rivals import Rival
+    from pipelines.investigation.separating_design import SeparatingDesign
     from pipelines.investigation.separation import Separation
+    from pipelines.mechanics.trajectory import Trajectory
 
 Question = tuple["list[Rival]", "PlannedRuns"]
 """Rivals, and the runs that are to decide between them."""
@@ -29,6 +32,29 @@ def question_of(
     if verdict is None:
         return rivals_named(labels, THE_LEG), runs
     return rivals_in_verdict(verdict, THE_LEG), runs.as_in_verdict(verdict)
+
+
+def last_excitation(config: Path | None, settings: Any, geometry: Any) -> "tuple[str, Trajectory]":
+    """Return the experiment's excitation, else the one that its settings give, and its name."""
+    from pipelines.design.excitation import design
+    from pipelines.mechanics.trajectory import read_trajectory
+
+    if config is not None or in_experiment_folder():
+        file = open_experiment(config).step("design").target
+        if file.is_file():
+            return str(file), read_trajectory(file)
+    return f"the excitation of {settings.criterion}", design(settings, geometry).trajectory
+
+
+def write_excitation(
+    output: Path, result: "SeparatingDesign", geometry: Any, mechanism: dict[str, Any]
+) -> None:
+    """Write an excitation with its settings."""
+    from pipelines.contracts import TRAJECTORY, describe
+
+    settings = result.design.settings.model_dump(mode="json")
+    config = {"design": settings, "geometry": vars(geometry)} | mechanism
+    TRAJECTORY.write(output, result.design.frame(), result.metadata() | describe(config=config))
 
 
 def show_separation(title: str, separation: "Separation") -> None:

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from pipelines.errors import InputError, SettingsError
 from pipelines.importing.finding import Finding, counted, noting, unnoted
 from pipelines.importing.quantities.conversion import columns_of, quantity
+from pipelines.importing.quantities.labels import labels_in
 from pipelines.importing.quantities.numbers import TAKEN_FOR_MISSING, numbers, same_stamps
-from pipelines.importing.sanity.labels import labels_in
 from pipelines.importing.sources.source import Columns, Source
 from pipelines.importing.time import clock
 from pipelines.importing.time.clock import Run

@@ -16,8 +16,9 @@ from pipelines.contracts.provenance import sha256
 from pipelines.errors import InputError, SettingsError, about
 from pipelines.importing.finding import Finding, Note, counted, noting
 from pipelines.importing.log import Log, read_log
+from pipelines.importing.quantities import labels
 from pipelines.importing.quantities.numbers import TAKEN_FOR_MISSING
-from pipelines.importing.sanity import labels, plausibility
+from pipelines.importing.sanity import plausibility
 from pipelines.importing.sources.joined import open_run, parts_of
 from pipelines.importing.time import held
 from pipelines.importing.time.clock import FASTEST_HZ, SLOWEST_HZ, Run, Sampling

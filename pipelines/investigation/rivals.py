@@ -120,8 +120,8 @@ def rivals_in_verdict(folder: Path, machine: Machine) -> list[Rival]:
     open_ones = next((causes for causes in choices if len(causes) > 1), None)
     if open_ones is None:
         raise InputError(
-            f"{folder}: its verdict leaves no choice of causes, which a motion could decide; name"
-            f" causes with {SETTING}"
+            f"{folder}: its verdict leaves no choice of causes, which a motion could decide;"
+            f" `exoid design {SETTING}` takes any causes"
         )
     total = sum(one.probability for one in open_ones)
     # Values that differ from run to run are no value of the next one.

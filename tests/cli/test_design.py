@@ -8,6 +8,7 @@ import pytest
 from exoid_cli.app import run
 from pipelines.contracts import TRAJECTORY
 from pipelines.settings import datasets
+from tests.report.sessions import decision_of, write_verdict
 
 PUBLISHED = str(datasets() / "paper" / "trajectory.toml")
 QUICK = "[design]\nharmonics = 2\nparticles = 16\niterations = 25\nseed = 4\n"
@@ -137,3 +138,24 @@ def test_a_question_that_no_excitation_answers_ends_in_one_line(
     said = capsys.readouterr().err
     assert message in said and len(said.splitlines()) == 1
     assert not list(tmp_path.glob("*.parquet"))
+
+
+def test_next_says_what_decides_and_writes_the_motion(tmp_path, config, capsys):
+    write_verdict(tmp_path, **decision_of(ties=()))
+    folder = tmp_path / "diagnosed"
+    assert run(["next", str(folder), "--config", config]) == 2
+    assert "leaves no choice of causes" in capsys.readouterr().err
+    document = json.loads((folder / "verdict.json").read_text())
+    tie = document["findings"][0]["causes"][0]
+    document["findings"][0]["causes"] = [
+        {**tie, "effect": "base_tilt", "joint": None, "probability": 0.6},
+        {**tie, "effect": "rotor_inertia", "joint": "knee", "probability": 0.3},
+    ]
+    document["causes"] = []
+    (folder / "verdict.json").write_text(json.dumps(document))
+    out = tmp_path / "next.parquet"
+    assert run(["next", str(folder), "--config", config, "-o", str(out)]) == 0
+    printed = capsys.readouterr().out
+    assert "Open: base tilt (0.67) or rotor inertia at the knee (0.33)." in printed
+    assert all(f"\n{what} " in printed for what in ("repeat", "motion", "run", "test"))
+    assert TRAJECTORY.read(out).metadata["criterion"] == "separation"

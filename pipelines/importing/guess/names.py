@@ -1,7 +1,6 @@
 """The meaning of a column's name: quantity, joint, unit, and whether it was measured."""
 
 import re
-import unicodedata
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
@@ -12,6 +11,7 @@ from pipelines.importing.guess.unit_in_name import (
     tick_in,
     unit_in,
 )
+from pipelines.importing.name_words import plain_words
 from pipelines.settings.units import UNITS
 
 
@@ -78,9 +78,6 @@ SLIDES = _words("position displacement travel stroke weg hub course")
 """Words of positions in metres; the m of ``theta_m`` is a motor's."""
 TWIN = re.compile(r"#\d+$")
 """Number of columns with the same name."""
-UMLAUTS = str.maketrans(
-    {"ä": "ae", "ö": "oe", "ü": "ue", "Ä": "Ae", "Ö": "Oe", "Ü": "Ue", "ß": "ss"}
-)
 SYMBOLS = _words("q qm th phi")
 """Of an angle, but also of an axis of a motor's current, ``i_q``."""
 SIGNS = _words("n v w s f")
@@ -226,15 +223,8 @@ def _confirms(in_name: UnitInName, quantity: str, words: set[str]) -> bool:
 
 def words_of(name: str) -> list[str]:
     """Return the words of a name in lower case, with compounds like Motordrehzahl split."""
-    # Umlauts are spelled out before accents are dropped: ü is ue in German words, é is e.
-    plain = BRACKETS.sub(_words_in, name).translate(UMLAUTS)
-    plain = "".join(
-        letter
-        for letter in unicodedata.normalize("NFKD", plain)
-        if not unicodedata.combining(letter)
-    )
-    words = re.findall(r"[A-Z]?[a-z]+|[A-Z]+(?![a-z])|\d+", plain)
-    return [part for word in words for part in _apart(word.lower())]
+    words = plain_words(BRACKETS.sub(_words_in, name))
+    return [part for word in words for part in _apart(word)]
 
 
 def _words_in(bracket: re.Match[str]) -> str:

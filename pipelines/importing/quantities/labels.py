@@ -7,7 +7,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from pipelines.importing.finding import Finding, counted
-from pipelines.importing.guess.names import words_of
+from pipelines.importing.name_words import plain_words
 
 _OF_MACHINES = (
     "id node device machine robot serial axis joint leg unit slave station actuator",
@@ -29,7 +29,7 @@ def labels_in(names: Sequence[str]) -> list[str]:
 
 
 def _kind(name: str) -> str:
-    words = set(words_of(name))
+    words = set(plain_words(name))
     if words & GOOD:
         return "quality"
     only = {word for word in words if not word.isdigit()}
