@@ -65,7 +65,7 @@ def design(
       exoid design
       exoid design --config exoid.toml -o trajectory.parquet
       exoid design --evaluate trajectory.toml
-      exoid design --separate parallel_spring@knee rotor_inertia@knee -o next.parquet
+      exoid design --separate base_tilt rotor_inertia@knee -o next.parquet
       exoid design --from diagnosed -o next.parquet
     """
     from pipelines.errors import InputError
