@@ -169,7 +169,14 @@ def sized(rivals: Sequence[Rival], problem: DetectionProblem) -> list[SizedRival
                 " temperatures; leave it out"
             )
     fitted = next((_length(rival.term, problem) for rival in rivals if rival.term), None)
-    return [_sized(rival, problem, fitted) for rival in rivals]
+    result = [_sized(rival, problem, fitted) for rival in rivals]
+    for one in result:
+        if not one.truths:
+            raise InputError(
+                f"{SETTING}: {one.rival.label} makes no torque with the last excitation; leave it"
+                " out, or give that run a wider motion"
+            )
+    return result
 
 
 def _length(term: Term, problem: DetectionProblem) -> float:

@@ -102,11 +102,12 @@ class Separation:
 
     def _share(self, i: int, j: int) -> float:
         """Return the largest share of a truth's power that a rival does not explain."""
-        return max(
+        shares = (
             min(1.0 - _squared(rival.span.T @ truth.torque) / whole for rival in self.shapes[j])
             for truth in self.truths[i]
             if (whole := _squared(truth.torque)) > 0.0
         )
+        return max(shares, default=0.0)
 
     def as_json(self) -> dict[str, Any]:
         """Return the rivals, the expected log odds, and the posterior to expect."""

@@ -131,6 +131,15 @@ def test_causes_that_planned_runs_cannot_show_are_refused(usual):
         of_size(usual, 1.0, "base_tilt", "friction_temperature@hip")
 
 
+def test_a_cause_without_torque_in_the_last_excitation_is_refused(usual):
+    # The knee rests, so that nothing of its speed shows.
+    a, b = usual.a.copy(), usual.b.copy()
+    a[1] = b[1] = 0.0
+    resting = replace(usual, a=a, b=b)
+    with pytest.raises(InputError, match="quadratic_drag@knee makes no torque with the last"):
+        of_size(resting, 1.0, "base_tilt", "quadratic_drag@knee")
+
+
 def test_a_tie_of_a_fitted_cause_makes_its_torque(usual):
     spring, inertia = named(*EASY)
     fitted = Rival(spring.effect, 0.6, Term(spring.effect, np.array([7.0, 0.0])))

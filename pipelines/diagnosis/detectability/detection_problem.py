@@ -140,13 +140,12 @@ class DetectionProblem:
         Returns
         -------
         float
-            N·m.
+            N·m; 0 where the joint has no usable samples.
         """
         j = self.joint(effect)
         # Runs in which the effect does not act would lower its rms.
         acting = [
             (r, c) for r, c in zip(self.runs, column, strict=True) if effect.explains(r.motion)
         ]
-        return float(
-            np.sqrt(np.mean(np.concatenate([c[r.usable[:, j], j, 0] for r, c in acting]) ** 2))
-        )
+        values = np.concatenate([c[r.usable[:, j], j, 0] for r, c in acting])
+        return float(np.sqrt(np.mean(values**2))) if len(values) else 0.0
