@@ -11,6 +11,8 @@ from numpy.typing import NDArray
 
 from pipelines.errors import InputError, SettingsError
 from pipelines.importing.finding import Finding, counted, noting, unnoted
+from pipelines.importing.guess.names import TWIN
+from pipelines.importing.guess.unit_in_name import unit_in
 from pipelines.importing.quantities.conversion import columns_of, quantity
 from pipelines.importing.quantities.numbers import TAKEN_FOR_MISSING, numbers, same_stamps
 from pipelines.importing.sanity.labels import labels_in
@@ -19,6 +21,7 @@ from pipelines.importing.time import clock
 from pipelines.importing.time.clock import Run
 from pipelines.settings import transmission
 from pipelines.settings.import_map import ImportMap, ReadingSettings, TimeSettings
+from pipelines.settings.units import UNITS
 from pipelines.signals.sampling import between_samples, sample_rate
 from pipelines.validation.suggestion import suggestion
 
@@ -235,6 +238,7 @@ def read_log(source: Source, settings: ImportMap, map_path: Path) -> Log:
     columns, labels = _loaded(needed, source, others)
     findings = [Finding("rows", remark, "") for remark in source.remarks]
     findings += _scaling(channels, source)
+    findings += _other_units(channels, source)
     note = noting("time", findings)
     if settings.time.column is None:
         # The longest, as constants have one row.
@@ -276,6 +280,27 @@ def _scaling(channels: Sequence[Channel], source: Source) -> Iterator[Finding]:
             if text is not None:
                 action = "taken to be in the values; if not, set scale and zero"
                 yield Finding(channel.target, f"the file says {text} of {name!r}", action)
+
+
+def _other_units(channels: Sequence[Channel], source: Source) -> Iterator[Finding]:
+    """Report units in the file, next to a column or in its name, that are not those of the map."""
+    for channel in channels:
+        reading = channel.reading
+        # A scale says that the map's author knows better; without it names and units agree.
+        if reading.column is None or "scale" in reading.model_fields_set:
+            continue
+        name = source.column_named(reading.column)
+        unit = source.units.get(name)
+        in_name = unit_in(f"{TWIN.sub('', name)} [{unit}]" if unit else TWIN.sub("", name))
+        if in_name is None or not in_name.decides or in_name.doubt:
+            continue
+        known = UNITS.get(in_name.unit or "")
+        if not in_name.unread and (known is None or known == reading.known_unit):
+            continue
+        seen = f"the file says {in_name.unread or in_name.unit} of {name!r}, the map {reading.unit}"
+        yield Finding(
+            channel.target, seen, "read as the map says; correct unit, or set scale = 1 if right"
+        )
 
 
 def _loaded(
