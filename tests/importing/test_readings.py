@@ -692,3 +692,11 @@ def test_a_unit_in_a_name_that_is_not_that_of_the_map_is_named(
     assert outcome.code == 0, outcome.err
     assert ("the file says" in outcome.printed) == bool(expected)
     assert expected in outcome.printed
+
+
+def test_a_torque_that_is_cut_off_is_named(imported, pendulum, write_csv):
+    columns = pendulum.columns()
+    assert "at full slope" not in imported(write_csv(columns)).printed
+    columns["torque"] = np.clip(columns["torque"], -0.9, 1.1)
+    expected = "pivot_torque_nm: comes to -0.9 and 1.1 at full slope and stays there"
+    assert expected in imported(write_csv(columns)).printed
