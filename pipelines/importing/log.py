@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from pipelines.errors import InputError, SettingsError
 from pipelines.importing.finding import Finding, counted, noting, unnoted
-from pipelines.importing.guess.names import TWIN
+from pipelines.importing.guess.names import TWIN, meaning
 from pipelines.importing.guess.unit_in_name import unit_in
 from pipelines.importing.quantities.conversion import columns_of, quantity
 from pipelines.importing.quantities.numbers import TAKEN_FOR_MISSING, numbers, same_stamps
@@ -113,13 +113,13 @@ class Log:
                 f"{channel.enabled!r} {problem}, expected 0 where the drive was off and another"
                 " number where it was on; correct joint.enabled in the map, or leave it out"
             )
-        for rows, state, meaning in (
+        for rows, state, cause in (
             (off, "is 0", "the drive was off"),
             (blank, "has no number", "the drive's state is not known"),
         ):
             if rows.any():
                 count = counted(int(rows.sum()), "row")
-                seen = f"{channel.enabled} {state} in {count}: {meaning}"
+                seen = f"{channel.enabled} {state} in {count}: {cause}"
                 findings.append(Finding(channel.target, seen, TAKEN_FOR_MISSING))
         # Missing, not zero: such a row leaves the recording, while a torque of zero would enter the
         # fit.
@@ -260,6 +260,7 @@ def read_log(source: Source, settings: ImportMap, map_path: Path) -> Log:
     )
     _check_switches(channels, source, {column, *same})
     columns = _as_numbers(columns, clocks, findings)
+    findings += _clocks_in_the_same_rows(channels, columns, settings.time, source)
     plus = None if settings.time.plus is None else columns[settings.time.plus]
     stamps = clock.stamps(columns[column], column, settings.time, note, plus)
     origin = clock.first_stamp(stamps)
@@ -301,6 +302,47 @@ def _other_units(channels: Sequence[Channel], source: Source) -> Iterator[Findin
         yield Finding(
             channel.target, seen, "read as the map says; correct unit, or set scale = 1 if right"
         )
+
+
+def _clocks_in_the_same_rows(
+    channels: Sequence[Channel], columns: Columns, time: TimeSettings, source: Source
+) -> Iterator[Finding]:
+    """Report channels that end, or are blank, where another clock in the file is.
+
+    A logger of several rates writes a block of columns for each, and a row of one block is at
+    another time than the same row of another.
+    """
+    stamps = columns[str(time.column)]
+    partial = {
+        one: known
+        for one in channels
+        if one.time is None and one.reading.column
+        for known in [np.isfinite(columns[one.reading.column])]
+        if len(known) == len(stamps) and known.any() and not known.all()
+    }
+    others = [
+        name
+        for name in source.names
+        if partial and name not in columns and meaning(name).quantity == "time"
+    ]
+    if not others or stamps.dtype.kind not in "iuf":
+        return
+    for name, values in _as_numbers(source.load(others), set(), []).items():
+        for channel, known in partial.items():
+            if not np.array_equal(np.isfinite(values), known):
+                continue
+            unit = UNITS.get(meaning(name).unit or "")
+            passed = np.diff(values[known]) * (unit.factor if unit else time.count_s)
+            of_log = np.diff(stamps[known]) * time.count_s
+            # The same instants in another unit are no other clock.
+            if (passed <= 0.0).any() or np.allclose(passed.sum(), of_log.sum(), rtol=0.01):
+                continue
+            seen = f"has values in just the rows of another clock, {name!r}"
+            action = (
+                f"read at the times of {time.column!r}; if the other is its clock, set"
+                f" {channel.where}.time to it"
+            )
+            yield Finding(channel.target, seen, action)
 
 
 def _loaded(
