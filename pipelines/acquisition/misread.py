@@ -5,7 +5,7 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from pipelines.acquisition.encodings import decimal_keys, is_gray
+from pipelines.acquisition.encodings import decimal_keys, is_gray, is_half_of_float64
 from pipelines.acquisition.leaps import sign_leap
 from pipelines.settings.rig import Register
 from pipelines.signals.cut_off import cut_off_at
@@ -37,6 +37,12 @@ def misread(quantity: str, register: Register, where: str, values: NDArray) -> I
             for key, value in keys.items()
         )
         yield f"all digits are decimal, so the register is not binary; set {where}.{written}"
+        return
+    if is_half_of_float64(register, new):
+        yield (
+            "values bend at each power of two, and go on evenly as the first half of a float64; set"
+            f' {where}.type = "float64", and look at the other values of this device'
+        )
         return
     # An angle may leap because it starts again after a turn.
     may_start_again = quantity in ("angle", "reference") and register.encoding == "binary"
