@@ -239,6 +239,7 @@ def read_log(source: Source, settings: ImportMap, map_path: Path) -> Log:
     findings = [Finding("rows", remark, "") for remark in source.remarks]
     findings += _scaling(channels, source)
     findings += _other_units(channels, source)
+    findings += _units_above(channels, source)
     note = noting("time", findings)
     if settings.time.column is None:
         # The longest, as constants have one row.
@@ -302,6 +303,24 @@ def _other_units(channels: Sequence[Channel], source: Source) -> Iterator[Findin
         yield Finding(
             channel.target, seen, "read as the map says; correct unit, or set scale = 1 if right"
         )
+
+
+def _units_above(channels: Sequence[Channel], source: Source) -> Iterator[Finding]:
+    """Report units of a quantity in lines that do not name the columns, if the map has others."""
+    above = [one for one in map(unit_in, source.fields_above) if one and one.unit and one.decides]
+    for channel in channels:
+        reading = channel.reading
+        if "scale" in reading.model_fields_set:
+            continue
+        alike = {
+            str(one.unit): UNITS[str(one.unit)]
+            for one in above
+            if UNITS[str(one.unit)].dimension == reading.known_unit.dimension
+        }
+        if alike and reading.known_unit not in alike.values():
+            seen = f"the lines above the rows say {' and '.join(alike)}, the map {reading.unit}"
+            action = "read as the map says; correct unit, or set scale = 1 if right"
+            yield Finding(channel.target, seen, action)
 
 
 def _clocks_in_the_same_rows(

@@ -478,3 +478,44 @@ purpose = "train"
     assert outcome.code == 0, outcome.err
     assert np.allclose(outcome.recording().frame["pivot_angle_rad"], pendulum.angle)
     assert "the file says N.mm/kg" in outcome.printed
+
+
+@pytest.mark.parametrize(
+    ("unit", "keys", "is_named"),
+    [
+        ("FT-LBS", "", True),
+        ("N-M", "", False),
+        ("FT-LBS", ", scale = 1.0", False),
+    ],
+)
+def test_units_above_columns_that_the_map_names_are_compared(
+    imported, pendulum, tmp_path, unit, keys, is_named
+):
+    """A dynamometer writes names with spaces between spaces, so that the map names the columns."""
+    lines = ["  mSec   TORQUE   POS (ANAT)   SPEED", f"  {unit}  DEGREES  DEG/SEC"]
+    columns = (1e3 * pendulum.time, pendulum.torque, np.degrees(pendulum.angle))
+    rows = zip(*columns, np.degrees(pendulum.velocity), strict=True)
+    lines += ["  ".join(f"{value:.4f}" for value in row) for row in rows]
+    path = tmp_path / "dynamometer.txt"
+    path.write_text("\n".join(lines) + "\n")
+    outcome = imported(
+        path,
+        map_text=f"""
+[source]
+columns = ["t", "tau", "q", "dq"]
+[time]
+column = "t"
+unit = "ms"
+[[joint]]
+name = "pivot"
+angle = {{ column = "q", unit = "deg" }}
+velocity = {{ column = "dq", unit = "deg/s" }}
+torque = {{ column = "tau", unit = "N·m"{keys} }}
+[[recording]]
+name = "whole"
+purpose = "train"
+""",
+    )
+    assert outcome.code == 0, outcome.err
+    assert ("say lbf·ft, the map N·m" in outcome.printed) == is_named
+    assert outcome.printed.count("the lines above") == is_named
