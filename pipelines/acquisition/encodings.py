@@ -77,6 +77,41 @@ def is_gray(register: Register, values: NDArray) -> bool:
     return float(np.abs(np.diff(decoded)).sum()) < least * way
 
 
+def is_half_of_float64(register: Register, values: NDArray) -> bool:
+    """Return whether values go on evenly only as the first half of a float64.
+
+    The first two registers of a float64 make a possible float32, about the logarithm of its value.
+    It bends at each power of two and leaps over zero, where the float64 goes on as it came. A
+    float32 goes on there, and bends as a float64. Friction lets both leap, anywhere.
+
+    Parameters
+    ----------
+    register : Register
+        As in the rig file.
+    values : (n,) array
+        New values in a row, as it reads them, SI units.
+    """
+    # Powers of two that are passed, and how far off a straight line a value is there, in medians of
+    # all, if it bends and if it does not.
+    enough, bends, goes_on = 6, 2.5, 1.5
+    known = values[np.isfinite(values)]
+    if register.type != "float32" or len(known) < 3:
+        return False
+    factor, offset = register.si
+    single = ((known - offset) / factor).astype(np.float32)
+    bits = single.view(np.uint32).astype(np.uint64) << np.uint64(32)
+    double = bits.view(np.float64)
+    passed = np.flatnonzero(np.diff(bits >> np.uint64(52)))
+    passed = passed[(passed > 0) & (passed < len(known) - 2)]
+    if len(passed) < enough or not np.isfinite(double).all():
+        return False
+    off_line = [np.abs(np.diff(x.astype(float), 2)) for x in (single, double)]
+    # Between two samples the bend may be nearer to either.
+    there = [float(np.median(np.maximum(off[passed - 1], off[passed]))) for off in off_line]
+    usual = [float(np.median(np.maximum(off[:-1], off[1:]))) for off in off_line]
+    return there[0] > bends * usual[0] and there[1] <= goes_on * usual[1]
+
+
 def _is_judged(register: Register) -> bool:
     """Return whether a register is read as a binary integer that is not too long."""
     is_binary = register.counts is not None and register.encoding == "binary"

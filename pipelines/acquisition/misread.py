@@ -5,9 +5,10 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from pipelines.acquisition.encodings import decimal_keys, is_gray
+from pipelines.acquisition.encodings import decimal_keys, is_gray, is_half_of_float64
 from pipelines.acquisition.leaps import sign_leap
 from pipelines.settings.rig import Register
+from pipelines.signals.cut_off import cut_off_at
 from pipelines.signals.folded import is_folded
 from pipelines.signals.held import are_held, new_values
 from pipelines.signals.rescaled import is_rescaled
@@ -37,6 +38,12 @@ def misread(quantity: str, register: Register, where: str, values: NDArray) -> I
         )
         yield f"all digits are decimal, so the register is not binary; set {where}.{written}"
         return
+    if is_half_of_float64(register, new):
+        yield (
+            "values bend at each power of two, and go on evenly as the first half of a float64; set"
+            f' {where}.type = "float64", and look at the other values of this device'
+        )
+        return
     # An angle may leap because it starts again after a turn.
     may_start_again = quantity in ("angle", "reference") and register.encoding == "binary"
     leaps = None if may_start_again else sign_leap(register, where, values)
@@ -47,6 +54,12 @@ def misread(quantity: str, register: Register, where: str, values: NDArray) -> I
         yield (
             f"{rows} of {len(values)} values are at the end of their register, where larger ones"
             " are cut off; let the device write coarser units, or two registers"
+        )
+    elif quantity in ("torque", "current") and (ends := cut_off_at(values)):
+        yield (
+            f"values come to {' and '.join(f'{end:.4g}' for end in ends)} at full slope and stay"
+            " there, so larger ones are cut off; let the device or its sensor have a larger range."
+            " If the drive limits its torque there, they are right"
         )
     if is_gray(register, new):
         yield (

@@ -11,6 +11,8 @@ from numpy.typing import NDArray
 
 from pipelines.errors import InputError, SettingsError
 from pipelines.importing.finding import Finding, counted, noting, unnoted
+from pipelines.importing.guess.names import TWIN, meaning
+from pipelines.importing.guess.unit_in_name import unit_in
 from pipelines.importing.quantities.conversion import columns_of, quantity
 from pipelines.importing.quantities.labels import labels_in
 from pipelines.importing.quantities.numbers import TAKEN_FOR_MISSING, numbers, same_stamps
@@ -19,6 +21,7 @@ from pipelines.importing.time import clock
 from pipelines.importing.time.clock import Run
 from pipelines.settings import transmission
 from pipelines.settings.import_map import ImportMap, ReadingSettings, TimeSettings
+from pipelines.settings.units import UNITS
 from pipelines.signals.sampling import between_samples, sample_rate
 from pipelines.validation.suggestion import suggestion
 
@@ -110,13 +113,13 @@ class Log:
                 f"{channel.enabled!r} {problem}, expected 0 where the drive was off and another"
                 " number where it was on; correct joint.enabled in the map, or leave it out"
             )
-        for rows, state, meaning in (
+        for rows, state, cause in (
             (off, "is 0", "the drive was off"),
             (blank, "has no number", "the drive's state is not known"),
         ):
             if rows.any():
                 count = counted(int(rows.sum()), "row")
-                seen = f"{channel.enabled} {state} in {count}: {meaning}"
+                seen = f"{channel.enabled} {state} in {count}: {cause}"
                 findings.append(Finding(channel.target, seen, TAKEN_FOR_MISSING))
         # Missing, not zero: such a row leaves the recording, while a torque of zero would enter the
         # fit.
@@ -235,6 +238,8 @@ def read_log(source: Source, settings: ImportMap, map_path: Path) -> Log:
     columns, labels = _loaded(needed, source, others)
     findings = [Finding("rows", remark, "") for remark in source.remarks]
     findings += _scaling(channels, source)
+    findings += _other_units(channels, source)
+    findings += _units_above(channels, source)
     note = noting("time", findings)
     if settings.time.column is None:
         # The longest, as constants have one row.
@@ -256,6 +261,7 @@ def read_log(source: Source, settings: ImportMap, map_path: Path) -> Log:
     )
     _check_switches(channels, source, {column, *same})
     columns = _as_numbers(columns, clocks, findings)
+    findings += _clocks_in_the_same_rows(channels, columns, settings.time, source)
     plus = None if settings.time.plus is None else columns[settings.time.plus]
     stamps = clock.stamps(columns[column], column, settings.time, note, plus)
     origin = clock.first_stamp(stamps)
@@ -276,6 +282,86 @@ def _scaling(channels: Sequence[Channel], source: Source) -> Iterator[Finding]:
             if text is not None:
                 action = "taken to be in the values; if not, set scale and zero"
                 yield Finding(channel.target, f"the file says {text} of {name!r}", action)
+
+
+def _other_units(channels: Sequence[Channel], source: Source) -> Iterator[Finding]:
+    """Report units in the file, next to a column or in its name, that are not those of the map."""
+    for channel in channels:
+        reading = channel.reading
+        # A scale says that the map's author knows better; without it names and units agree.
+        if reading.column is None or "scale" in reading.model_fields_set:
+            continue
+        name = source.column_named(reading.column)
+        unit = source.units.get(name)
+        in_name = unit_in(f"{TWIN.sub('', name)} [{unit}]" if unit else TWIN.sub("", name))
+        if in_name is None or not in_name.decides or in_name.doubt:
+            continue
+        known = UNITS.get(in_name.unit or "")
+        if not in_name.unread and (known is None or known == reading.known_unit):
+            continue
+        seen = f"the file says {in_name.unread or in_name.unit} of {name!r}, the map {reading.unit}"
+        yield Finding(
+            channel.target, seen, "read as the map says; correct unit, or set scale = 1 if right"
+        )
+
+
+def _units_above(channels: Sequence[Channel], source: Source) -> Iterator[Finding]:
+    """Report units of a quantity in lines that do not name the columns, if the map has others."""
+    above = [one for one in map(unit_in, source.fields_above) if one and one.unit and one.decides]
+    for channel in channels:
+        reading = channel.reading
+        if "scale" in reading.model_fields_set:
+            continue
+        alike = {
+            str(one.unit): UNITS[str(one.unit)]
+            for one in above
+            if UNITS[str(one.unit)].dimension == reading.known_unit.dimension
+        }
+        if alike and reading.known_unit not in alike.values():
+            seen = f"the lines above the rows say {' and '.join(alike)}, the map {reading.unit}"
+            action = "read as the map says; correct unit, or set scale = 1 if right"
+            yield Finding(channel.target, seen, action)
+
+
+def _clocks_in_the_same_rows(
+    channels: Sequence[Channel], columns: Columns, time: TimeSettings, source: Source
+) -> Iterator[Finding]:
+    """Report channels that end, or are blank, where another clock in the file is.
+
+    A logger of several rates writes a block of columns for each, and a row of one block is at
+    another time than the same row of another.
+    """
+    stamps = columns[str(time.column)]
+    partial = {
+        one: known
+        for one in channels
+        if one.time is None and one.reading.column
+        for known in [np.isfinite(columns[one.reading.column])]
+        if len(known) == len(stamps) and known.any() and not known.all()
+    }
+    others = [
+        name
+        for name in source.names
+        if partial and name not in columns and meaning(name).quantity == "time"
+    ]
+    if not others or stamps.dtype.kind not in "iuf":
+        return
+    for name, values in _as_numbers(source.load(others), set(), []).items():
+        for channel, known in partial.items():
+            if not np.array_equal(np.isfinite(values), known):
+                continue
+            unit = UNITS.get(meaning(name).unit or "")
+            passed = np.diff(values[known]) * (unit.factor if unit else time.count_s)
+            of_log = np.diff(stamps[known]) * time.count_s
+            # The same instants in another unit are no other clock.
+            if (passed <= 0.0).any() or np.allclose(passed.sum(), of_log.sum(), rtol=0.01):
+                continue
+            seen = f"has values in just the rows of another clock, {name!r}"
+            action = (
+                f"read at the times of {time.column!r}; if the other is its clock, set"
+                f" {channel.where}.time to it"
+            )
+            yield Finding(channel.target, seen, action)
 
 
 def _loaded(

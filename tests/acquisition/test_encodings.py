@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from pipelines.acquisition.encodings import CHANCE, decimal_keys, is_gray
+from pipelines.acquisition.encodings import CHANCE, decimal_keys, is_gray, is_half_of_float64
 from pipelines.acquisition.misread import misread
 from pipelines.modbus.register_block import Block
 from pipelines.settings.rig import Register
@@ -137,3 +137,38 @@ def test_binary_values_are_hardly_ever_taken_for_digits():
         alarms += bool(decimal_keys(register, np.clip(counts, low, high)))
     # Twice the probability that is allowed for each encoding that is tried.
     assert alarms <= 2 * CHANCE * most_tried * registers
+
+
+def torques(friction=0.0, noise=0.0, gravity=10.0, channels=100):
+    """Return torques of a machine that swings, with leaps of friction and with noise."""
+    seconds = np.arange(300) / 100.0
+    for seed in range(channels):
+        rng = np.random.default_rng(seed)
+        speed, *phases = rng.uniform([3.0, 0.0, 0.0, 0.0], [12.0, 6.0, 6.0, 6.0])
+        torque = np.sin(speed * seconds + phases[0]) + 0.3 * np.sin(2.3 * speed * seconds)
+        torque = gravity * torque + friction * np.sign(np.cos(speed * seconds + phases[2]))
+        yield torque + rng.normal(0.0, noise, len(seconds))
+
+
+@pytest.mark.parametrize("scale", [1.0, 0.05])
+@pytest.mark.parametrize("friction", [0.0, 3.0])
+def test_the_first_half_of_a_float64_is_named(friction, scale):
+    """As a map of float32 reads a PLC's long reals."""
+    single, double = ({"type": kind, "scale": scale} for kind in ("float32", "float64"))
+    named = []
+    for torque in torques(friction, noise=0.05):
+        halves = [Block({"x": Register(address=0, **double)}).encode({"x": x})[:2] for x in torque]
+        register = Register(address=0, **single)
+        values = np.array([Block({"x": register}).decode(half)["x"] for half in halves])
+        texts = list(misread("torque", register, "torque", values))
+        named.append(any('set torque.type = "float64"' in text for text in texts))
+    assert np.mean(named) > 0.7
+
+
+@pytest.mark.parametrize("friction", [0.0, 0.3, 1.0, 3.0, 10.0])
+@pytest.mark.parametrize("noise", [0.0, 0.05, 0.15])
+@pytest.mark.parametrize("gravity", [0.0, 1.0, 10.0])
+def test_a_float32_is_not_taken_for_half_of_a_float64(friction, noise, gravity):
+    register = Register(address=0, type="float32")
+    channels = torques(friction, noise * max(friction, 0.1), gravity)
+    assert not any(is_half_of_float64(register, torque) for torque in channels)

@@ -681,6 +681,25 @@ def test_a_torque_that_is_cut_off_at_the_end_of_its_register_is_named(tmp_path, 
         assert re.search(rf"{name}: \d+ of \d+ values are at the end of their register", text)
 
 
+@pytest.mark.parametrize("most", [27648, 16000], ids=["beyond", "within"])
+def test_a_torque_that_is_cut_off_within_its_register_is_named(tmp_path, most):
+    """An analog input ends at 27648 counts, far from the end of its 16 bits."""
+
+    def answer(n, words):
+        torque = round(1.5 * most * np.sin(0.1 * words[0]))
+        return [words[0], 500, min(max(torque, -27648), 27648) & 0xFFFF]
+
+    server, _ = a_device(answer)
+    path, output = tmp_path / "bench.toml", tmp_path / "bench.parquet"
+    path.write_text(BENCH.format(port=server.getsockname()[1], watchdog_s=1.0))
+    settings = RunSettings(name="one", run="exo_alone", purpose="train", duration_s=2.0)
+    with server:
+        record_only(path, settings, output, 100.0, ELBOW)
+        (texts, findings) = misread_values(output, path), findings_of(path, server)
+    assert len(texts) == len(findings) == (most == 27648)
+    assert all("at full slope and stay there" in text for text in (*texts, *findings))
+
+
 @pytest.mark.parametrize("run", ["exo_alone", "with_human"])
 @pytest.mark.parametrize("scale", [0.1, -0.1])
 def test_a_torque_of_the_wrong_sign_is_named_where_nobody_is_in_the_machine(tmp_path, run, scale):

@@ -378,3 +378,35 @@ def test_hundredths_of_a_second_are_no_frames(imported, pendulum, write_csv, eve
     )
     assert outcome.code == 0
     assert_allclose(outcome.recording().frame["time_s"], 0.01 * hundredths, atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("clock", "is_named"),
+    [
+        (lambda time_s: {"Time 2 [s]": time_s[::4]}, True),
+        (lambda time_s: {"Time 2 [s]": time_s[:500]}, False),
+        (lambda time_s: {"Time 2 [ms]": 1e3 * time_s[:500]}, False),
+        (lambda time_s: {"Time 2 [ms]": 1e3 * time_s[:500][::-1]}, False),
+        (lambda time_s: {"Time 2 [s]": time_s[: 4 * 499 : 4]}, False),
+    ],
+    ids=["of its block", "the same", "in another unit", "backwards", "of other rows"],
+)
+def test_a_channel_that_ends_with_another_clock_is_named(
+    imported, pendulum, write_csv, clock, is_named
+):
+    """A logger of two rates writes a block for each; the slower one ends far above."""
+    columns = pendulum.columns()
+    slow = clock(pendulum.time) | {"angle": columns.pop("angle")[::4]}
+    del columns["velocity"]
+    blank = {name: [*v, *[""] * (len(pendulum.time) - len(v))] for name, v in slow.items()}
+    text = MAP.replace('velocity = { column = "velocity", unit = "rad/s" }\n', "")
+    outcome = imported(write_csv(columns | blank), map_text=text)
+    assert outcome.code == 0, outcome.err
+    expected = f"rows of another clock, '{next(iter(slow))}'; read at the times of 'time'"
+    assert (expected in outcome.printed) == is_named
+    timed = text.replace('column = "angle"', f'column = "angle", time = "{next(iter(slow))}"')
+    if is_named:
+        outcome = imported(write_csv(columns | blank), map_text=timed)
+        assert "of another clock" not in outcome.printed
+        frame = outcome.recording().frame
+        assert_allclose(frame["pivot_angle_rad"], pendulum.angle[: len(frame)], atol=1e-3)

@@ -446,3 +446,76 @@ def test_names_with_units_apart_are_not_given_to_the_columns_of_others(read, tab
     source, _ = read([header, *joined(table, " ")], "log.txt")
     assert source.names == ("c1", "c2", "c3", "c4")
     assert "has 8 names, the rows 4 fields" in source.remarks[0]
+
+
+def test_a_unit_that_is_a_product_makes_a_line_one_of_units(imported, pendulum, tmp_path):
+    """Motion capture writes quantity, axis and unit in three lines, and moments for each kg."""
+    lines = [
+        "Model Outputs",
+        "200",
+        ",,A:KneeAngles,,A:KneeMoment,",
+        "Frame,Sub Frame,X,Y,X,Y",
+        ",,deg,deg,N.mm/kg,N.mm/kg",
+    ]
+    values = zip(np.degrees(pendulum.angle), 10.0 * pendulum.torque, strict=True)
+    lines += [f"{k},0,{angle},1.5,{moment},2.5" for k, (angle, moment) in enumerate(values, 1)]
+    path = tmp_path / "model.csv"
+    path.write_text("\n".join(lines) + "\n")
+    outcome = imported(
+        path,
+        map_text="""
+[time]
+rate_hz = 200.0
+[[joint]]
+name = "pivot"
+angle = { column = "A:KneeAngles [X] [deg]", unit = "deg" }
+torque = { column = "A:KneeMoment [X] [N.mm/kg]", unit = "N.mm" }
+[[recording]]
+name = "whole"
+purpose = "train"
+""",
+    )
+    assert outcome.code == 0, outcome.err
+    assert np.allclose(outcome.recording().frame["pivot_angle_rad"], pendulum.angle)
+    assert "the file says N.mm/kg" in outcome.printed
+
+
+@pytest.mark.parametrize(
+    ("unit", "keys", "is_named"),
+    [
+        ("FT-LBS", "", True),
+        ("N-M", "", False),
+        ("FT-LBS", ", scale = 1.0", False),
+    ],
+)
+def test_units_above_columns_that_the_map_names_are_compared(
+    imported, pendulum, tmp_path, unit, keys, is_named
+):
+    """A dynamometer writes names with spaces between spaces, so that the map names the columns."""
+    lines = ["  mSec   TORQUE   POS (ANAT)   SPEED", f"  {unit}  DEGREES  DEG/SEC"]
+    columns = (1e3 * pendulum.time, pendulum.torque, np.degrees(pendulum.angle))
+    rows = zip(*columns, np.degrees(pendulum.velocity), strict=True)
+    lines += ["  ".join(f"{value:.4f}" for value in row) for row in rows]
+    path = tmp_path / "dynamometer.txt"
+    path.write_text("\n".join(lines) + "\n")
+    outcome = imported(
+        path,
+        map_text=f"""
+[source]
+columns = ["t", "tau", "q", "dq"]
+[time]
+column = "t"
+unit = "ms"
+[[joint]]
+name = "pivot"
+angle = {{ column = "q", unit = "deg" }}
+velocity = {{ column = "dq", unit = "deg/s" }}
+torque = {{ column = "tau", unit = "N·m"{keys} }}
+[[recording]]
+name = "whole"
+purpose = "train"
+""",
+    )
+    assert outcome.code == 0, outcome.err
+    assert ("say lbf·ft, the map N·m" in outcome.printed) == is_named
+    assert outcome.printed.count("the lines above") == is_named

@@ -665,3 +665,38 @@ def test_joints_that_are_one_are_named(imported, pendulum, write_csv, first, sec
     expected = "joint1_angle_rad: is joint0_angle_rad, "
     assert (expected in outcome.printed) == bool(later)
     assert later in outcome.printed
+
+
+@pytest.mark.parametrize(
+    ("written", "keys", "expected"),
+    [
+        ("torque [mNm]", 'unit = "N·m"', "the file says mN·m of 'torque [mNm]', the map N·m"),
+        ("torque_Nmm", 'unit = "N·m"', "the file says mN·m"),
+        ("torque [N.mm/kg]", 'unit = "N.mm"', "the file says N.mm/kg"),
+        ("torque [0.1 Nm]", 'unit = "N·m"', "the file says 0.1 Nm"),
+        ("torque [A]", 'unit = "N·m"', "the file says A of"),
+        ("torque [N m]", 'unit = "N·m"', ""),
+        ("torque (N*mm)", 'unit = "mN·m"', ""),
+        ("torque [mNm]", 'unit = "N·m", scale = 1.0', ""),
+        ("torque m", 'unit = "N·m"', ""),
+    ],
+)
+def test_a_unit_in_a_name_that_is_not_that_of_the_map_is_named(
+    imported, pendulum, write_csv, written, keys, expected
+):
+    columns = pendulum.columns()
+    path = write_csv(columns | {written: columns.pop("torque")})
+    text = MAP.replace('column = "torque", unit = "N·m"', f'column = "{written}", {keys}')
+    assert written in text
+    outcome = imported(path, map_text=text)
+    assert outcome.code == 0, outcome.err
+    assert ("the file says" in outcome.printed) == bool(expected)
+    assert expected in outcome.printed
+
+
+def test_a_torque_that_is_cut_off_is_named(imported, pendulum, write_csv):
+    columns = pendulum.columns()
+    assert "at full slope" not in imported(write_csv(columns)).printed
+    columns["torque"] = np.clip(columns["torque"], -0.9, 1.1)
+    expected = "pivot_torque_nm: comes to -0.9 and 1.1 at full slope and stays there"
+    assert expected in imported(write_csv(columns)).printed

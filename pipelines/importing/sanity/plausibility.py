@@ -16,6 +16,7 @@ from pipelines.mechanics.geometry import Geometry
 from pipelines.mechanics.machine import known_in_words, machine_of, mechanisms_of
 from pipelines.mechanics.remedies import AT_REST
 from pipelines.settings.import_map import ImportMap, JointSettings
+from pipelines.signals.cut_off import cut_off_at
 from pipelines.signals.folded import is_folded
 from pipelines.signals.held import new_values
 from pipelines.signals.power import GIVES_BACK, mean_power
@@ -72,6 +73,7 @@ def check(columns: Mapping[str, NDArray], settings: ImportMap) -> Iterator[Findi
         yield from _too_strong(columns, joint)
         yield from _rescaled(columns, joint)
         yield from _unsigned(columns, joint)
+        yield from _cut_off(columns, joint)
     yield from _copies(columns, settings.joint)
     joints = [joint.joint for joint in settings.joint]
     # Drives whose torque was not measured may do the work that the others absorb.
@@ -222,6 +224,17 @@ def _unsigned(columns: Mapping[str, NDArray], joint: JointSettings) -> Iterator[
         if is_folded(columns[name][new_values(columns[name])]):
             seen = "turns round at 0 as a magnitude does, so its sign is missing or wrong"
             action = "kept; where another column has it, let an expression multiply both"
+            yield Finding(name, seen, action)
+
+
+def _cut_off(columns: Mapping[str, NDArray], joint: JointSettings) -> Iterator[Finding]:
+    """Report a torque whose largest values were cut off, as by an amplifier."""
+    for quantity in _torque_of(joint):
+        name = joint.joint.column(quantity)
+        if ends := cut_off_at(columns[name]):
+            limits = " and ".join(f"{end:.4g}" for end in ends)
+            seen = f"comes to {limits} at full slope and stays there, so larger values are cut off"
+            action = "kept; log a larger range. If the drive limits its torque there, it is right"
             yield Finding(name, seen, action)
 
 

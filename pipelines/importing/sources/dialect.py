@@ -61,6 +61,8 @@ class Dialect:
     clocks: Mapping[str, str]
     scaling: Mapping[str, str]
     """Factors and offsets that lines above the rows give to columns."""
+    fields_above: tuple[str, ...]
+    """Fields above the rows, where those are not the names of the columns."""
     notes: tuple[str, ...]
     remark: str
     """How the names follow from a header that does not fit; empty where it does."""
@@ -147,6 +149,7 @@ def find_dialect(start: bytes, whole: bool, settings: SourceSettings) -> Dialect
         named.units,
         {apart[k]: apart[clock] for k, clock in named.clocks.items()},
         {apart[k]: text for k, text in table.scaling(below).items()},
+        table.fields(below) if settings.columns or named.remark else (),
         (*notes, remark) if remark else tuple(notes),
         remark,
     )
@@ -233,6 +236,10 @@ class _Table:
     def scaling(self, lines: Sequence[str]) -> dict[int, str]:
         """Return the factors and offsets above the rows, by the places of their columns."""
         return scaling_of(self._above(lines), self.width)
+
+    def fields(self, lines: Sequence[str]) -> tuple[str, ...]:
+        """Return the fields of all lines above the rows."""
+        return tuple(field for line in self._above(lines) for field in line if field)
 
     def heads(self, lines: Sequence[str]) -> tuple[frozenset[str], ...]:
         """Return the words above each column."""

@@ -6,8 +6,8 @@ from dataclasses import dataclass, field
 
 from pipelines.settings.units import unit_named
 
-UNIT = r"[\[(].*[\])]|[-\w°µ/·*%.²]{1,5}"
-"""Pattern of a possible unknown unit: in brackets, or short."""
+UNIT = r"[\[(].*[\])]|[-\w°µ/·*%.²]{1,5}|[^\W\d]{1,3}([·*./][^\W\d]{1,3}){1,3}"
+"""Pattern of a possible unknown unit: in brackets, or short, or a product as ``N.mm/kg``."""
 _OF_FACTORS = (
     "factor factors scale scaling scalefactor gain gains multiplier slope sensitivity resolution",
     "faktor faktoren skalierung skalierungsfaktor verstärkung empfindlichkeit steigung auflösung",

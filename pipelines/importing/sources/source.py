@@ -29,6 +29,8 @@ class Source:
     """Clocks of columns, where the file says which was sampled by which."""
     scaling: Mapping[str, str] = field(default_factory=dict)
     """Factors and offsets that the file gives to columns, but that may be in their values."""
+    fields_above: tuple[str, ...] = ()
+    """Fields above the rows that are no names of columns, because the map or numbers name them."""
     remarks: tuple[str, ...] = ()
     """What was not as it should be, for the user."""
     aliases: Mapping[str, str] = field(default_factory=dict)

@@ -63,6 +63,7 @@ def _source(path: Path, format: str, dialect: Dialect, content: Callable[[], Any
         units=dialect.units,
         clocks=dialect.clocks,
         scaling=dialect.scaling,
+        fields_above=dialect.fields_above,
         remarks=(dialect.remark,) if dialect.remark else (),
     )
 
