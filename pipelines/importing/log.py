@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from pipelines.errors import InputError, SettingsError
 from pipelines.importing.finding import Finding, counted, noting, unnoted
-from pipelines.importing.guess.names import TWIN, meaning
-from pipelines.importing.guess.unit_in_name import unit_in
+from pipelines.importing.naming.meaning import TWIN, meaning
+from pipelines.importing.naming.unit_in_name import unit_in
 from pipelines.importing.quantities.conversion import columns_of, quantity
 from pipelines.importing.quantities.labels import labels_in
 from pipelines.importing.quantities.numbers import TAKEN_FOR_MISSING, numbers, same_stamps

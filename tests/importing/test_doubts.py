@@ -8,8 +8,8 @@ import pytest
 from numpy.testing import assert_allclose
 
 from exoid_cli.app import run
-from pipelines.importing.guess.names import meaning
 from pipelines.importing.guess.torque import fit_torque
+from pipelines.importing.naming.meaning import meaning
 from pipelines.importing.quantities.wraparound import fill_value, full_at, sign_bit
 from tests.importing.test_guess import guessed
 

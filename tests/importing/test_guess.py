@@ -13,7 +13,7 @@ from scipy.io import savemat
 
 from exoid_cli.app import run
 from pipelines.importing.guess.counting import lost_sign
-from pipelines.importing.guess.names import meaning
+from pipelines.importing.naming.meaning import meaning
 from pipelines.importing.quantities.consistency import integral_agreement
 
 pytestmark = pytest.mark.long

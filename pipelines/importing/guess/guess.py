@@ -17,7 +17,6 @@ from pipelines.importing.guess.joints import (
     moving,
     order_is_known,
 )
-from pipelines.importing.guess.names import Meaning, meaning
 from pipelines.importing.guess.own_clocks import (
     OwnClock,
     clocks_by_rows,
@@ -33,6 +32,7 @@ from pipelines.importing.guess.time import (
     settled,
     write_time,
 )
+from pipelines.importing.naming.meaning import Meaning, meaning
 from pipelines.importing.quantities.numbers import numbers, same_stamps, whole_nanoseconds
 from pipelines.importing.quantities.wraparound import fill_value
 from pipelines.importing.sources.source import Columns, Source

@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from pipelines.importing.guess.names import SIDES, Meaning, in_counts
 from pipelines.importing.guess.torque import fit_torque
+from pipelines.importing.naming.meaning import SIDES, Meaning, in_counts
 from pipelines.importing.quantities.consistency import integral_agreement, likeliest_integrals
 from pipelines.importing.quantities.numbers import are_whole
 from pipelines.settings.units import UNITS

@@ -7,8 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipelines.importing.guess.joints import TURNING
-from pipelines.importing.guess.names import Meaning
 from pipelines.importing.guess.time import TimeGuess, guess_time
+from pipelines.importing.naming.meaning import Meaning
 from pipelines.importing.quantities.numbers import same_stamps
 from pipelines.importing.sources.source import Columns
 from pipelines.settings.units import UNITS

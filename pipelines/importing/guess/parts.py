@@ -6,8 +6,8 @@ from pathlib import Path
 
 from pipelines.errors import about
 from pipelines.importing.guess.joints import TURNING
-from pipelines.importing.guess.names import Meaning, meaning
 from pipelines.importing.guess.own_clocks import EQUALLY_FAST
+from pipelines.importing.naming.meaning import Meaning, meaning
 from pipelines.importing.sources.joined import firsts, open_run
 from pipelines.importing.sources.open import open_source
 from pipelines.importing.sources.source import Source

@@ -9,9 +9,9 @@ from numpy.typing import NDArray
 
 from pipelines.importing.guess.joints import JointColumns
 from pipelines.importing.guess.motion import CLEAR, EXACT, FROM_NAME, factors
-from pipelines.importing.guess.names import Meaning
 from pipelines.importing.guess.proposal import Proposal
-from pipelines.importing.guess.unit_in_name import count_of
+from pipelines.importing.naming.meaning import Meaning
+from pipelines.importing.naming.unit_in_name import count_of
 from pipelines.importing.quantities.consistency import integral_agreement
 from pipelines.importing.quantities.numbers import are_whole
 from pipelines.importing.time import clock

@@ -7,7 +7,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from pipelines.importing.finding import Finding, counted
-from pipelines.importing.name_words import plain_words
+from pipelines.importing.naming.words import plain_words
 
 _OF_MACHINES = (
     "id node device machine robot serial axis joint leg unit slave station actuator",

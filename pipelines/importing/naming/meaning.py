@@ -4,14 +4,14 @@ import re
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
-from pipelines.importing.guess.unit_in_name import (
+from pipelines.importing.naming.unit_in_name import (
     BRACKETS,
     QUANTITIES,
     UnitInName,
     tick_in,
     unit_in,
 )
-from pipelines.importing.name_words import plain_words
+from pipelines.importing.naming.words import plain_words
 from pipelines.settings.units import UNITS
 
 
