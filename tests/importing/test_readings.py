@@ -694,6 +694,33 @@ def test_a_unit_in_a_name_that_is_not_that_of_the_map_is_named(
     assert expected in outcome.printed
 
 
+@pytest.mark.parametrize(
+    ("written", "keys", "expected"),
+    [
+        ("Time (ms)", 'unit = "s"', "the file says ms of 'Time (ms)', the map s"),
+        ("t_min", 'unit = "s"', "the file says min of 't_min'"),
+        ("Elapsed (h)", 'unit = "s"', "the file says h of"),
+        ("Gait cycle (%)", 'unit = "s"', "the file says % of"),
+        ("tick_100us", 'unit = "s"', "the file says 100us of"),
+        ("Time (ms)", 'unit = "s", scale = 1.0', ""),
+        ("Time [sec]", 'unit = "s"', ""),
+        ("motor_A", 'unit = "s"', ""),
+    ],
+)
+def test_a_unit_in_the_name_of_a_clock_that_is_not_that_of_the_map_is_named(
+    imported, pendulum, write_csv, written, keys, expected
+):
+    columns = pendulum.columns()
+    path = write_csv({written: columns.pop("time")} | columns)
+    keys = keys.replace(", ", "\n")
+    text = MAP.replace('column = "time"\nunit = "s"', f'column = "{written}"\n{keys}')
+    assert written in text
+    outcome = imported(path, map_text=text)
+    assert outcome.code == 0, outcome.err
+    assert ("the file says" in outcome.printed) == bool(expected)
+    assert expected in outcome.printed
+
+
 def test_a_torque_that_is_cut_off_is_named(imported, pendulum, write_csv):
     columns = pendulum.columns()
     assert "at full slope" not in imported(write_csv(columns)).printed

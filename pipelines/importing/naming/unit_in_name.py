@@ -103,6 +103,34 @@ def tick_in(name: str) -> UnitInName | None:
     return UnitInName(_without(name, tick), _written(tick[3]), decides=True, unread=tick[0])
 
 
+@dataclass(frozen=True)
+class ClockUnit:
+    """The unit in the name of a clock."""
+
+    text: str
+    count_s: float | None
+    """Duration of a count, s; None for a unit of something else, such as % of a cycle."""
+
+
+def clock_unit_in(name: str) -> ClockUnit | None:
+    """Return the unit in the name of a column that is a clock; None where it has none."""
+    in_name = unit_in(name) or tick_in(name)
+    if in_name is None:
+        # A clock has no minimum.
+        is_min = re.search(r"[\W_]min$", name)
+        return ClockUnit("min", UNITS["min"].factor) if is_min else None
+    known = UNITS.get(in_name.unit or "")
+    is_time = known is not None and known.dimension == "time"
+    if in_name.unread:
+        count = count_of(in_name.unread)
+        count_s = UNITS[count[0]].factor * count[1] if count else None
+        return ClockUnit(in_name.unread, count_s)
+    # A letter or a word is a unit of time here, or none.
+    if known is None or not (is_time or in_name.decides):
+        return None
+    return ClockUnit(str(in_name.unit), known.factor if is_time else None)
+
+
 def count_of(unread: str) -> tuple[str, float] | None:
     """Return unit and number of a duration such as ``100us`` or ``0.1 ms``; None for others."""
     tick = TICK.fullmatch(unread)
