@@ -672,7 +672,10 @@ def test_joints_that_are_one_are_named(imported, pendulum, write_csv, first, sec
     [
         ("torque [mNm]", 'unit = "N·m"', "the file says mN·m of 'torque [mNm]', the map N·m"),
         ("torque_Nmm", 'unit = "N·m"', "the file says mN·m"),
+        ("torque_daNm", 'unit = "N·m"', "the file says daNm of 'torque_daNm', the map N·m"),
         ("torque [N.mm/kg]", 'unit = "N.mm"', "the file says N.mm/kg"),
+        ("torque ozf-in", 'unit = "N·m"', "the file says ozf-in"),
+        ("torque_gf", 'unit = "N·m"', ""),
         ("torque [0.1 Nm]", 'unit = "N·m"', "the file says 0.1 Nm"),
         ("torque [A]", 'unit = "N·m"', "the file says A of"),
         ("torque [N m]", 'unit = "N·m"', ""),

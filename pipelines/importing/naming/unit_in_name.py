@@ -42,7 +42,9 @@ FOREIGN = {
     **dict.fromkeys(("µA", "μA", "uA", "kA"), "current"),
     **dict.fromkeys(("µV", "μV", "uV", "kV"), "voltage"),
 }
-"""Units in brackets that no map has, and the quantity that is measured in them."""
+"""Units that no map has, and the quantity that is measured in them."""
+AMBIGUOUS = frozenset({"ft", "ft/s", "grad", "grad/s", "gf", "dyn"})
+"""Those that are units in brackets only: their letters may be a word."""
 BRACKETS = re.compile(r"[\[({<]([^\])}>]*)[\])}>]")
 FACTOR = re.compile(
     r"(?<![^\W_])[x×*/] ?10+(?![\d.])|(?<!\d)10 ?\^ ?-?\d+|\d*\.\d+(?= ?[^\W\d_])"
@@ -166,6 +168,10 @@ def _with_factor(name: str) -> UnitInName | None:
 def _outside_of_brackets(name: str) -> UnitInName | None:
     """Return the last unit among the words of a name, or a letter at its end that is one."""
     matches = list(_WORD.finditer(name)) or list(_LETTER.finditer(name))
+    foreign = _FOREIGN_WORD.search(name)
+    if foreign is not None and (not matches or matches[-1].re is _LETTER):
+        unread = _FOREIGN_WORDS[foreign[0]]
+        return UnitInName(_without(name, foreign), None, decides=True, unread=unread)
     if not matches:
         return None
     # The last one, because a unit follows what it is of.
@@ -222,4 +228,14 @@ _NO_PREFIX = r"(?<!(?<![^\W_])[dcmuµμM])(?<!(?<![^\W_])da)"
 _BEFORE = rf"(?:(?<![^\W_])|(?<=[a-z0-9])(?=[A-Z]){_NO_PREFIX})"
 _AFTER = r"(?:(?![^\W\d_])|(?=[A-Z][a-z]))"
 _WORD = re.compile(rf"{_BEFORE}(?i:{_ANY}){_AFTER}")
+_FOREIGN_WORDS = {
+    form: text
+    for text in FOREIGN
+    if text not in AMBIGUOUS
+    for form in (text, re.sub("/s$", "_s", text))
+}
+_FOREIGN_WORD = re.compile(
+    rf"(?<![^\W_])(?:{'|'.join(map(re.escape, sorted(_FOREIGN_WORDS, key=len, reverse=True)))})"
+    r"(?![^\W_])"
+)
 _LETTER = re.compile(r"(?<=[^\W_][_\s./,:-])[smAVNKC°%]$")
