@@ -3,6 +3,7 @@
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from math import isclose
 from pathlib import Path
 from typing import TypeVar
 
@@ -12,7 +13,7 @@ from numpy.typing import NDArray
 from pipelines.errors import InputError, SettingsError
 from pipelines.importing.finding import Finding, counted, noting, unnoted
 from pipelines.importing.naming.meaning import TWIN, meaning
-from pipelines.importing.naming.unit_in_name import unit_in
+from pipelines.importing.naming.unit_in_name import clock_unit_in, unit_in
 from pipelines.importing.quantities.conversion import columns_of, quantity
 from pipelines.importing.quantities.labels import labels_in
 from pipelines.importing.quantities.numbers import TAKEN_FOR_MISSING, numbers, same_stamps
@@ -21,7 +22,7 @@ from pipelines.importing.time import clock
 from pipelines.importing.time.clock import Run
 from pipelines.settings import transmission
 from pipelines.settings.import_map import ImportMap, ReadingSettings, TimeSettings
-from pipelines.settings.units import UNITS
+from pipelines.settings.units import ALIASES, UNITS
 from pipelines.signals.sampling import between_samples, sample_rate
 from pipelines.validation.suggestion import suggestion
 
@@ -240,6 +241,7 @@ def read_log(source: Source, settings: ImportMap, map_path: Path) -> Log:
     findings += _scaling(channels, source)
     findings += _other_units(channels, source)
     findings += _units_above(channels, source)
+    findings += _other_units_of_clocks(channels, columns, settings.time, source)
     note = noting("time", findings)
     if settings.time.column is None:
         # The longest, as constants have one row.
@@ -303,6 +305,31 @@ def _other_units(channels: Sequence[Channel], source: Source) -> Iterator[Findin
         yield Finding(
             channel.target, seen, "read as the map says; correct unit, or set scale = 1 if right"
         )
+
+
+def _other_units_of_clocks(
+    channels: Sequence[Channel], columns: Columns, time: TimeSettings, source: Source
+) -> Iterator[Finding]:
+    """Report units of clocks in the file that are not those of the map."""
+    stated = "scale" in time.model_fields_set
+    clocks = {} if stated else {time.column: time.unit, time.plus: time.plus_unit}
+    for channel in channels:
+        reading = channel.reading
+        if reading.time_scale is None and not (reading.time_unit is None and stated):
+            clocks.setdefault(channel.time, reading.time_unit or time.unit)
+    for column, unit in clocks.items():
+        # Dates are in no unit, and typed durations know theirs.
+        if column is None or columns[column].dtype.kind in "mM" or unit == "iso8601":
+            continue
+        name = source.column_named(column)
+        plain = TWIN.sub("", name)
+        of_file = source.units.get(name)
+        in_name = clock_unit_in(f"{plain} [{of_file}]" if of_file else plain)
+        factor = UNITS[ALIASES.get(unit, unit)].factor
+        if in_name is None or isclose(in_name.count_s or 0.0, factor):
+            continue
+        seen = f"the file says {in_name.text} of {name!r}, the map {unit}"
+        yield Finding("time", seen, "read as the map says; correct unit, or set scale if right")
 
 
 def _units_above(channels: Sequence[Channel], source: Source) -> Iterator[Finding]:

@@ -323,6 +323,20 @@ def test_grad_in_lower_case_is_a_degree_in_doubt(guessed, pendulum, write_csv, n
     assert ("gon" in doubts.get("joint[0].angle.unit", "")) == (name == "winkel_grad")
 
 
+def test_a_unit_that_no_map_has_is_read_without_brackets_too(guessed, pendulum, write_csv):
+    gon = 200.0 / np.pi
+    log = {
+        "time_s": pendulum.time,
+        "phi_gon": gon * pendulum.angle,
+        "omega_gon_s": gon * pendulum.velocity,
+        "torque_Nm": pendulum.torque,
+    }
+    text, doubts = guessed(write_csv(log))
+    assert "its name says 'gon'" in doubts["joint[0].angle.unit"]
+    assert "its name says 'gon/s'" in doubts["joint[0].velocity.unit"]
+    assert tomllib.loads(text)["joint"][0]["name"] == "joint"
+
+
 @pytest.mark.parametrize(("in_turn", "is_gon"), [(400.0, True), (360.0, False)])
 def test_a_velocity_in_rad_shows_that_grad_is_a_gon(guessed, pendulum, write_csv, in_turn, is_gon):
     columns = {

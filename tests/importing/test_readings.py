@@ -672,7 +672,10 @@ def test_joints_that_are_one_are_named(imported, pendulum, write_csv, first, sec
     [
         ("torque [mNm]", 'unit = "N·m"', "the file says mN·m of 'torque [mNm]', the map N·m"),
         ("torque_Nmm", 'unit = "N·m"', "the file says mN·m"),
+        ("torque_daNm", 'unit = "N·m"', "the file says daNm of 'torque_daNm', the map N·m"),
         ("torque [N.mm/kg]", 'unit = "N.mm"', "the file says N.mm/kg"),
+        ("torque ozf-in", 'unit = "N·m"', "the file says ozf-in"),
+        ("torque_gf", 'unit = "N·m"', ""),
         ("torque [0.1 Nm]", 'unit = "N·m"', "the file says 0.1 Nm"),
         ("torque [A]", 'unit = "N·m"', "the file says A of"),
         ("torque [N m]", 'unit = "N·m"', ""),
@@ -687,6 +690,33 @@ def test_a_unit_in_a_name_that_is_not_that_of_the_map_is_named(
     columns = pendulum.columns()
     path = write_csv(columns | {written: columns.pop("torque")})
     text = MAP.replace('column = "torque", unit = "N·m"', f'column = "{written}", {keys}')
+    assert written in text
+    outcome = imported(path, map_text=text)
+    assert outcome.code == 0, outcome.err
+    assert ("the file says" in outcome.printed) == bool(expected)
+    assert expected in outcome.printed
+
+
+@pytest.mark.parametrize(
+    ("written", "keys", "expected"),
+    [
+        ("Time (ms)", 'unit = "s"', "the file says ms of 'Time (ms)', the map s"),
+        ("t_min", 'unit = "s"', "the file says min of 't_min'"),
+        ("Elapsed (h)", 'unit = "s"', "the file says h of"),
+        ("Gait cycle (%)", 'unit = "s"', "the file says % of"),
+        ("tick_100us", 'unit = "s"', "the file says 100us of"),
+        ("Time (ms)", 'unit = "s", scale = 1.0', ""),
+        ("Time [sec]", 'unit = "s"', ""),
+        ("motor_A", 'unit = "s"', ""),
+    ],
+)
+def test_a_unit_in_the_name_of_a_clock_that_is_not_that_of_the_map_is_named(
+    imported, pendulum, write_csv, written, keys, expected
+):
+    columns = pendulum.columns()
+    path = write_csv({written: columns.pop("time")} | columns)
+    keys = keys.replace(", ", "\n")
+    text = MAP.replace('column = "time"\nunit = "s"', f'column = "{written}"\n{keys}')
     assert written in text
     outcome = imported(path, map_text=text)
     assert outcome.code == 0, outcome.err

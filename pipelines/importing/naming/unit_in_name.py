@@ -42,7 +42,9 @@ FOREIGN = {
     **dict.fromkeys(("µA", "μA", "uA", "kA"), "current"),
     **dict.fromkeys(("µV", "μV", "uV", "kV"), "voltage"),
 }
-"""Units in brackets that no map has, and the quantity that is measured in them."""
+"""Units that no map has, and the quantity that is measured in them."""
+AMBIGUOUS = frozenset({"ft", "ft/s", "grad", "grad/s", "gf", "dyn"})
+"""Those that are units in brackets only: their letters may be a word."""
 BRACKETS = re.compile(r"[\[({<]([^\])}>]*)[\])}>]")
 FACTOR = re.compile(
     r"(?<![^\W_])[x×*/] ?10+(?![\d.])|(?<!\d)10 ?\^ ?-?\d+|\d*\.\d+(?= ?[^\W\d_])"
@@ -103,6 +105,34 @@ def tick_in(name: str) -> UnitInName | None:
     return UnitInName(_without(name, tick), _written(tick[3]), decides=True, unread=tick[0])
 
 
+@dataclass(frozen=True)
+class ClockUnit:
+    """The unit in the name of a clock."""
+
+    text: str
+    count_s: float | None
+    """Duration of a count, s; None for a unit of something else, such as % of a cycle."""
+
+
+def clock_unit_in(name: str) -> ClockUnit | None:
+    """Return the unit in the name of a column that is a clock; None where it has none."""
+    in_name = unit_in(name) or tick_in(name)
+    if in_name is None:
+        # A clock has no minimum.
+        is_min = re.search(r"[\W_]min$", name)
+        return ClockUnit("min", UNITS["min"].factor) if is_min else None
+    known = UNITS.get(in_name.unit or "")
+    is_time = known is not None and known.dimension == "time"
+    if in_name.unread:
+        count = count_of(in_name.unread)
+        count_s = UNITS[count[0]].factor * count[1] if count else None
+        return ClockUnit(in_name.unread, count_s)
+    # A letter or a word is a unit of time here, or none.
+    if known is None or not (is_time or in_name.decides):
+        return None
+    return ClockUnit(str(in_name.unit), known.factor if is_time else None)
+
+
 def count_of(unread: str) -> tuple[str, float] | None:
     """Return unit and number of a duration such as ``100us`` or ``0.1 ms``; None for others."""
     tick = TICK.fullmatch(unread)
@@ -138,6 +168,10 @@ def _with_factor(name: str) -> UnitInName | None:
 def _outside_of_brackets(name: str) -> UnitInName | None:
     """Return the last unit among the words of a name, or a letter at its end that is one."""
     matches = list(_WORD.finditer(name)) or list(_LETTER.finditer(name))
+    foreign = _FOREIGN_WORD.search(name)
+    if foreign is not None and (not matches or matches[-1].re is _LETTER):
+        unread = _FOREIGN_WORDS[foreign[0]]
+        return UnitInName(_without(name, foreign), None, decides=True, unread=unread)
     if not matches:
         return None
     # The last one, because a unit follows what it is of.
@@ -194,4 +228,14 @@ _NO_PREFIX = r"(?<!(?<![^\W_])[dcmuµμM])(?<!(?<![^\W_])da)"
 _BEFORE = rf"(?:(?<![^\W_])|(?<=[a-z0-9])(?=[A-Z]){_NO_PREFIX})"
 _AFTER = r"(?:(?![^\W\d_])|(?=[A-Z][a-z]))"
 _WORD = re.compile(rf"{_BEFORE}(?i:{_ANY}){_AFTER}")
+_FOREIGN_WORDS = {
+    form: text
+    for text in FOREIGN
+    if text not in AMBIGUOUS
+    for form in (text, re.sub("/s$", "_s", text))
+}
+_FOREIGN_WORD = re.compile(
+    rf"(?<![^\W_])(?:{'|'.join(map(re.escape, sorted(_FOREIGN_WORDS, key=len, reverse=True)))})"
+    r"(?![^\W_])"
+)
 _LETTER = re.compile(r"(?<=[^\W_][_\s./,:-])[smAVNKC°%]$")
