@@ -21,8 +21,15 @@ Question = tuple["list[Rival]", "PlannedRuns"]
 def question_of(
     labels: Sequence[str], verdict: Path | None, experiment: Any, settings: Any
 ) -> Question:
-    """Return the rivals that are named, or that a verdict leaves open, and the runs to plan."""
+    """Return the rivals that are named, or that a verdict leaves open, and the runs to plan.
+
+    Raises
+    ------
+    InputError
+        Where they are no rivals, or one is part of the model, or the verdict is not of the leg.
+    """
     from pipelines.diagnosis.detectability.planned_runs import usual_plant
+    from pipelines.errors import InputError
     from pipelines.investigation.planned import PlannedRuns
     from pipelines.investigation.rivals import rivals_in_verdict, rivals_named
     from pipelines.mechanics.machine import THE_LEG
@@ -30,8 +37,18 @@ def question_of(
     known = tuple(experiment.diagnose.known)
     runs = PlannedRuns(settings, usual_plant(experiment.mechanism), known=known)
     if verdict is None:
-        return rivals_named(labels, THE_LEG), runs
-    return rivals_in_verdict(verdict, THE_LEG), runs.as_in_verdict(verdict)
+        rivals = rivals_named(labels, THE_LEG)
+    else:
+        # First whether it is of the leg: the labels of another machine would be refused for typos.
+        runs = runs.as_in_verdict(verdict)
+        rivals = rivals_in_verdict(verdict, THE_LEG)
+    for rival in rivals:
+        if rival.label in known:
+            raise InputError(
+                f"{rival.label} is in diagnose.known, and so part of the model that all causes"
+                " share; remove it there, or separate other causes"
+            )
+    return rivals, runs
 
 
 def last_excitation(config: Path | None, settings: Any, geometry: Any) -> "tuple[str, Trajectory]":

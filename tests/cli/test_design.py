@@ -8,7 +8,7 @@ import pytest
 from exoid_cli.app import run
 from pipelines.contracts import TRAJECTORY
 from pipelines.settings import datasets
-from tests.report.sessions import decision_of, write_verdict
+from tests.report.sessions import AXIS, decision_of, write_verdict
 
 PUBLISHED = str(datasets() / "paper" / "trajectory.toml")
 QUICK = "[design]\nharmonics = 2\nparticles = 16\niterations = 25\nseed = 4\n"
@@ -117,6 +117,23 @@ def test_an_excitation_that_decides_between_causes_is_written_with_what_to_expec
     assert run(["design", "--evaluate", str(out), "--separate", *PAIR, "--json"]) == 0
     judged = json.loads(capsys.readouterr().out)["separation"]
     assert np.array(judged["expected_posterior"]).shape == (2, 2)
+
+
+def test_a_known_effect_is_no_cause_to_separate(tmp_path, capsys):
+    config = tmp_path / "exoid.toml"
+    config.write_text('[diagnose]\nknown = ["rotor_inertia@knee"]\n')
+    labels = ["rotor_inertia@knee", "base_tilt"]
+    out = tmp_path / "next.parquet"
+    options = ["--separate", *labels, "--config", str(config), "-o", str(out)]
+    assert run(["design", *options]) == 2
+    assert "rotor_inertia@knee is in diagnose.known" in capsys.readouterr().err
+
+
+def test_a_verdict_of_another_machine_is_refused_for_that(tmp_path, monkeypatch, capsys):
+    write_verdict(tmp_path, AXIS, **decision_of(AXIS))
+    monkeypatch.chdir(tmp_path)
+    assert run(["design", "--from", "diagnosed", "-o", "next.parquet"]) == 2
+    assert "expected hip and knee" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(
