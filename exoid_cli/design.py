@@ -6,10 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import typer
 
 from exoid_cli.console import console
-from exoid_cli.experiment_folder import (
-    open_experiment,
-    settings_in_force,
-)
+from exoid_cli.experiment_folder import open_experiment, settings_in_force
 from exoid_cli.options import AgainOption, ConfigOption, output_option
 from exoid_cli.separate import (
     Question,
@@ -99,32 +96,38 @@ def design(
     experiment.mechanism.refuse_all_but_the_leg("`exoid design`")
     geometry = geometry_from(experiment) or Geometry()
     question = question_of(causes or (), verdict, experiment, settings) if decides else None
+    last = last_excitation(config, settings, geometry) if decides else None
     if evaluate:
-        _evaluate(evaluate, settings, geometry, question)
-    elif output and question:
-        last = last_excitation(config, settings, geometry)
+        _evaluate(evaluate, settings, geometry, question, last)
+    elif output and question and last:
         _separate(output, question, geometry, last, experiment.sections("mechanism"))
     elif output:
         _design(output, settings, geometry, experiment.sections("mechanism"))
 
 
-def _evaluate(file: Path, settings: Any, geometry: Any, question: "Question | None") -> None:
+def _evaluate(
+    file: Path,
+    settings: Any,
+    geometry: Any,
+    question: "Question | None",
+    last: "tuple[str, Trajectory] | None",
+) -> None:
     from pipelines.design.quality import quality
+    from pipelines.investigation.rivals import sized
+    from pipelines.investigation.separating_design import separation
     from pipelines.mechanics.trajectory import read_trajectory
 
     trajectory = read_trajectory(file)
-    result, document = quality(trajectory, settings, geometry), {}
-    if question:
-        from pipelines.investigation.rivals import sized
-        from pipelines.investigation.separation import Separation
-
+    result = quality(trajectory, settings, geometry)
+    separated = None
+    if question and last:
         rivals, runs = question
-        problem = runs.problem(trajectory, rivals)
-        separated = Separation.of(sized(rivals, problem), problem)
-        document = {"separation": separated.as_json()}
+        # As large as in the last excitation, as a design supposes them.
+        separated = separation(sized(rivals, runs.problem(last[1], rivals)), runs, trajectory)
+    document = {"separation": separated.as_json()} if separated else {}
     console.emit({"file": str(file), **result.as_metadata(), **document})
     _show(str(file), result)
-    if question:
+    if separated:
         show_separation(f"With {file}", separated)
     console.say(f"\n{file}: {settings.criterion} {result.value(settings.criterion):.4g}")
 

@@ -114,9 +114,10 @@ def test_an_excitation_that_decides_between_causes_is_written_with_what_to_expec
     assert metadata["criterion_value"] == pytest.approx(min(odds[0, 1], odds[1, 0]))
     assert np.array(found["expected_posterior"]).sum(axis=1) == pytest.approx(1.0)
     # Judged as any other excitation, it separates them as it says.
-    assert run(["design", "--evaluate", str(out), "--separate", *PAIR, "--json"]) == 0
+    options = ["--separate", *PAIR, "--config", config, "--json"]
+    assert run(["design", "--evaluate", str(out), *options]) == 0
     judged = json.loads(capsys.readouterr().out)["separation"]
-    assert np.array(judged["expected_posterior"]).shape == (2, 2)
+    assert np.array(judged["expected_log_odds"]) == pytest.approx(odds)
 
 
 def test_a_known_effect_is_no_cause_to_separate(tmp_path, capsys):
