@@ -144,7 +144,7 @@ def _separate(
     rivals, runs = question
     with console.progress("designing", total=1.0) as report:
         result = separating_design(rivals, runs, geometry, last[1], report)
-    write_excitation(output, result, geometry, mechanism)
+    write_excitation(output, result.design, result.metadata(), geometry, mechanism)
     _warn_of_cut(result.design)
     console.emit({"file": str(output), **result.metadata()})
     _show(str(output), result.design.quality)
@@ -165,13 +165,11 @@ def _warn_of_cut(design: "Design") -> None:
 
 
 def _design(output: Path, settings: Any, geometry: Any, mechanism: dict[str, Any]) -> None:
-    from pipelines.contracts import TRAJECTORY, describe
     from pipelines.design.excitation import design
 
     with console.progress("designing", total=1.0) as report:
         result = design(settings, geometry, report)
-    config = {"design": settings.model_dump(mode="json"), "geometry": vars(geometry)} | mechanism
-    TRAJECTORY.write(output, result.frame(), result.metadata() | describe(config=config))
+    write_excitation(output, result, result.metadata(), geometry, mechanism)
     _warn_of_cut(result)
     console.emit({"file": str(output), **result.metadata()})
     _show(str(output), result.quality)

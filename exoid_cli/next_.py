@@ -46,8 +46,9 @@ def next_(
     _, last = last_excitation(config, settings, geometry)
     with console.progress("designing", total=1.0) as report:
         result = next_experiments(rivals, runs, geometry, last, report)
-    if output and result.design:
-        write_excitation(output, result.design, geometry, experiment.sections("mechanism"))
+    if output and (best := result.design):
+        mechanism = experiment.sections("mechanism")
+        write_excitation(output, best.design, best.metadata(), geometry, mechanism)
     console.emit(
         {
             "open": [{"cause": one.label, "probability": one.probability} for one in rivals],

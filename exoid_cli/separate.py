@@ -8,9 +8,9 @@ from exoid_cli.console import console
 from exoid_cli.experiment_folder import in_experiment_folder, open_experiment
 
 if TYPE_CHECKING:
+    from pipelines.design.excitation import Design
     from pipelines.investigation.planned import PlannedRuns
     from pipelines.investigation.rivals import Rival
-    from pipelines.investigation.separating_design import SeparatingDesign
     from pipelines.investigation.separation import Separation
     from pipelines.mechanics.trajectory import Trajectory
 
@@ -64,14 +64,18 @@ def last_excitation(config: Path | None, settings: Any, geometry: Any) -> "tuple
 
 
 def write_excitation(
-    output: Path, result: "SeparatingDesign", geometry: Any, mechanism: dict[str, Any]
+    output: Path,
+    design: "Design",
+    metadata: dict[str, Any],
+    geometry: Any,
+    mechanism: dict[str, Any],
 ) -> None:
     """Write an excitation with its settings."""
     from pipelines.contracts import TRAJECTORY, describe
 
-    settings = result.design.settings.model_dump(mode="json")
+    settings = design.settings.model_dump(mode="json")
     config = {"design": settings, "geometry": vars(geometry)} | mechanism
-    TRAJECTORY.write(output, result.design.frame(), result.metadata() | describe(config=config))
+    TRAJECTORY.write(output, design.frame(), metadata | describe(config=config))
 
 
 def show_separation(title: str, separation: "Separation") -> None:
