@@ -165,8 +165,8 @@ def sized(rivals: Sequence[Rival], problem: DetectionProblem) -> list[SizedRival
     for rival in rivals:
         if not rival.effect.shows_in(motions):
             raise InputError(
-                f"{rival.label} cannot show in planned runs, which have no temperatures; give `exoid"
-                f" design {SETTING}` the other causes"
+                f"{rival.label} cannot show in planned runs, which have no temperatures; give"
+                f" `exoid design {SETTING}` the other causes"
             )
     fitted = next((_length(rival.term, problem) for rival in rivals if rival.term), None)
     result = [_sized(rival, problem, fitted) for rival in rivals]
