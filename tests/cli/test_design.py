@@ -158,22 +158,38 @@ def test_a_question_that_no_excitation_answers_ends_in_one_line(
     assert not list(tmp_path.glob("*.parquet"))
 
 
+def leave_open(folder, effect, joint):
+    """Let a verdict leave open whether the base is tilted, or another cause is there."""
+    document = json.loads((folder / "verdict.json").read_text())
+    tie = document["findings"][0]["causes"][0]
+    document["findings"][0]["causes"] = [
+        {**tie, "effect": "base_tilt", "joint": None, "probability": 0.6},
+        {**tie, "effect": effect, "joint": joint, "probability": 0.3},
+    ]
+    document["causes"] = []
+    (folder / "verdict.json").write_text(json.dumps(document))
+
+
 def test_next_says_what_decides_and_writes_the_motion(tmp_path, config, capsys):
     write_verdict(tmp_path, **decision_of(ties=()))
     folder = tmp_path / "diagnosed"
     assert run(["next", str(folder), "--config", config]) == 2
     assert "leaves no choice of causes" in capsys.readouterr().err
-    document = json.loads((folder / "verdict.json").read_text())
-    tie = document["findings"][0]["causes"][0]
-    document["findings"][0]["causes"] = [
-        {**tie, "effect": "base_tilt", "joint": None, "probability": 0.6},
-        {**tie, "effect": "rotor_inertia", "joint": "knee", "probability": 0.3},
-    ]
-    document["causes"] = []
-    (folder / "verdict.json").write_text(json.dumps(document))
+    leave_open(folder, "rotor_inertia", "knee")
     out = tmp_path / "next.parquet"
     assert run(["next", str(folder), "--config", config, "-o", str(out)]) == 0
     printed = capsys.readouterr().out
     assert "Open: base tilt (0.67) or rotor inertia at the knee (0.33)." in printed
     assert all(f"\n{what} " in printed for what in ("repeat", "motion", "run", "test"))
     assert TRAJECTORY.read(out).metadata["criterion"] == "separation"
+
+
+def test_next_says_that_it_writes_no_motion_where_none_separates_the_causes(
+    tmp_path, config, capsys
+):
+    write_verdict(tmp_path, **decision_of(ties=()))
+    folder, out = tmp_path / "diagnosed", tmp_path / "next.parquet"
+    leave_open(folder, "encoder_offset", "hip")
+    assert run(["next", str(folder), "--config", config, "-o", str(out)]) == 0
+    assert f"{out}: not written, as no motion" in " ".join(capsys.readouterr().err.split())
+    assert not out.exists()
