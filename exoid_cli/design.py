@@ -6,10 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import typer
 
 from exoid_cli.console import console
-from exoid_cli.experiment_folder import (
-    open_experiment,
-    settings_in_force,
-)
+from exoid_cli.experiment_folder import open_experiment, settings_in_force
 from exoid_cli.options import AgainOption, ConfigOption, output_option
 from exoid_cli.separate import (
     Question,
@@ -99,32 +96,38 @@ def design(
     experiment.mechanism.refuse_all_but_the_leg("`exoid design`")
     geometry = geometry_from(experiment) or Geometry()
     question = question_of(causes or (), verdict, experiment, settings) if decides else None
+    last = last_excitation(config, settings, geometry) if decides else None
     if evaluate:
-        _evaluate(evaluate, settings, geometry, question)
-    elif output and question:
-        last = last_excitation(config, settings, geometry)
+        _evaluate(evaluate, settings, geometry, question, last)
+    elif output and question and last:
         _separate(output, question, geometry, last, experiment.sections("mechanism"))
     elif output:
         _design(output, settings, geometry, experiment.sections("mechanism"))
 
 
-def _evaluate(file: Path, settings: Any, geometry: Any, question: "Question | None") -> None:
+def _evaluate(
+    file: Path,
+    settings: Any,
+    geometry: Any,
+    question: "Question | None",
+    last: "tuple[str, Trajectory] | None",
+) -> None:
     from pipelines.design.quality import quality
+    from pipelines.investigation.rivals import sized
+    from pipelines.investigation.separating_design import separation
     from pipelines.mechanics.trajectory import read_trajectory
 
     trajectory = read_trajectory(file)
-    result, document = quality(trajectory, settings, geometry), {}
-    if question:
-        from pipelines.investigation.rivals import sized
-        from pipelines.investigation.separation import Separation
-
+    result = quality(trajectory, settings, geometry)
+    separated = None
+    if question and last:
         rivals, runs = question
-        problem = runs.problem(trajectory, rivals)
-        separated = Separation.of(sized(rivals, problem), problem)
-        document = {"separation": separated.as_json()}
+        # As large as in the last excitation, as a design supposes them.
+        separated = separation(sized(rivals, runs.problem(last[1], rivals)), runs, trajectory)
+    document = {"separation": separated.as_json()} if separated else {}
     console.emit({"file": str(file), **result.as_metadata(), **document})
     _show(str(file), result)
-    if question:
+    if separated:
         show_separation(f"With {file}", separated)
     console.say(f"\n{file}: {settings.criterion} {result.value(settings.criterion):.4g}")
 
@@ -141,7 +144,7 @@ def _separate(
     rivals, runs = question
     with console.progress("designing", total=1.0) as report:
         result = separating_design(rivals, runs, geometry, last[1], report)
-    write_excitation(output, result, geometry, mechanism)
+    write_excitation(output, result.design, result.metadata(), geometry, mechanism)
     _warn_of_cut(result.design)
     console.emit({"file": str(output), **result.metadata()})
     _show(str(output), result.design.quality)
@@ -162,13 +165,11 @@ def _warn_of_cut(design: "Design") -> None:
 
 
 def _design(output: Path, settings: Any, geometry: Any, mechanism: dict[str, Any]) -> None:
-    from pipelines.contracts import TRAJECTORY, describe
     from pipelines.design.excitation import design
 
     with console.progress("designing", total=1.0) as report:
         result = design(settings, geometry, report)
-    config = {"design": settings.model_dump(mode="json"), "geometry": vars(geometry)} | mechanism
-    TRAJECTORY.write(output, result.frame(), result.metadata() | describe(config=config))
+    write_excitation(output, result, result.metadata(), geometry, mechanism)
     _warn_of_cut(result)
     console.emit({"file": str(output), **result.metadata()})
     _show(str(output), result.quality)

@@ -46,8 +46,14 @@ def next_(
     _, last = last_excitation(config, settings, geometry)
     with console.progress("designing", total=1.0) as report:
         result = next_experiments(rivals, runs, geometry, last, report)
-    if output and result.design:
-        write_excitation(output, result.design, geometry, experiment.sections("mechanism"))
+    best = result.design
+    if output and best:
+        mechanism = experiment.sections("mechanism")
+        write_excitation(output, best.design, best.metadata(), geometry, mechanism)
+    elif output:
+        console.warn(
+            f"{output}: not written, as no motion within [design.bounds] separates two causes"
+        )
     console.emit(
         {
             "open": [{"cause": one.label, "probability": one.probability} for one in rivals],

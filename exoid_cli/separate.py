@@ -8,9 +8,9 @@ from exoid_cli.console import console
 from exoid_cli.experiment_folder import in_experiment_folder, open_experiment
 
 if TYPE_CHECKING:
+    from pipelines.design.excitation import Design
     from pipelines.investigation.planned import PlannedRuns
     from pipelines.investigation.rivals import Rival
-    from pipelines.investigation.separating_design import SeparatingDesign
     from pipelines.investigation.separation import Separation
     from pipelines.mechanics.trajectory import Trajectory
 
@@ -21,8 +21,15 @@ Question = tuple["list[Rival]", "PlannedRuns"]
 def question_of(
     labels: Sequence[str], verdict: Path | None, experiment: Any, settings: Any
 ) -> Question:
-    """Return the rivals that are named, or that a verdict leaves open, and the runs to plan."""
+    """Return the rivals that are named, or that a verdict leaves open, and the runs to plan.
+
+    Raises
+    ------
+    InputError
+        Where they are no rivals, or one is part of the model, or the verdict is not of the leg.
+    """
     from pipelines.diagnosis.detectability.planned_runs import usual_plant
+    from pipelines.errors import InputError
     from pipelines.investigation.planned import PlannedRuns
     from pipelines.investigation.rivals import rivals_in_verdict, rivals_named
     from pipelines.mechanics.machine import THE_LEG
@@ -30,8 +37,18 @@ def question_of(
     known = tuple(experiment.diagnose.known)
     runs = PlannedRuns(settings, usual_plant(experiment.mechanism), known=known)
     if verdict is None:
-        return rivals_named(labels, THE_LEG), runs
-    return rivals_in_verdict(verdict, THE_LEG), runs.as_in_verdict(verdict)
+        rivals = rivals_named(labels, THE_LEG)
+    else:
+        # First whether it is of the leg: the labels of another machine would be refused for typos.
+        runs = runs.as_in_verdict(verdict)
+        rivals = rivals_in_verdict(verdict, THE_LEG)
+    for rival in rivals:
+        if rival.label in known:
+            raise InputError(
+                f"{rival.label} is in diagnose.known, and so part of the model that all causes"
+                " share; remove it there, or separate other causes"
+            )
+    return rivals, runs
 
 
 def last_excitation(config: Path | None, settings: Any, geometry: Any) -> "tuple[str, Trajectory]":
@@ -47,14 +64,18 @@ def last_excitation(config: Path | None, settings: Any, geometry: Any) -> "tuple
 
 
 def write_excitation(
-    output: Path, result: "SeparatingDesign", geometry: Any, mechanism: dict[str, Any]
+    output: Path,
+    design: "Design",
+    metadata: dict[str, Any],
+    geometry: Any,
+    mechanism: dict[str, Any],
 ) -> None:
     """Write an excitation with its settings."""
     from pipelines.contracts import TRAJECTORY, describe
 
-    settings = result.design.settings.model_dump(mode="json")
+    settings = design.settings.model_dump(mode="json")
     config = {"design": settings, "geometry": vars(geometry)} | mechanism
-    TRAJECTORY.write(output, result.design.frame(), result.metadata() | describe(config=config))
+    TRAJECTORY.write(output, design.frame(), metadata | describe(config=config))
 
 
 def show_separation(title: str, separation: "Separation") -> None:

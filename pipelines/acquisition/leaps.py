@@ -70,7 +70,14 @@ def sign_leap(register: Register, where: str, values: NDArray) -> str | None:
     if bits > 32 or register.encoding != "binary" or register.counts is None:
         return None
     full = leap(register, values)
-    if full == 2.0**bits and register.is_unsigned:
+    has_sign = register.sign_bit is not None or register.direction is not None
+    if has_sign and full in (2.0**bits, 2.0 ** (bits - 1)):
+        key = "direction" if register.sign_bit is None else "sign_bit"
+        remedy = (
+            f'it is a number of two\'s complement; set {where}.type = "int{bits}" and leave {key}'
+            " out"
+        )
+    elif full == 2.0**bits and register.is_unsigned:
         remedy = f'negative values are read as large ones; set {where}.type = "int{bits}"'
     elif full == 2.0**bits:
         middle = -(2.0 ** (bits - 1)) * register.scale

@@ -30,25 +30,14 @@ def misread(quantity: str, register: Register, where: str, values: NDArray) -> I
         In a row, as it reads them, SI units; NaN where missing.
     """
     new = values[new_values(values)]
-    keys = decimal_keys(register, new)
-    if keys:
-        written = " and ".join(
-            f'{key} = "{value}"' if isinstance(value, str) else f"{key} = {value}"
-            for key, value in keys.items()
-        )
-        yield f"all digits are decimal, so the register is not binary; set {where}.{written}"
-        return
-    if is_half_of_float64(register, new):
-        yield (
-            "values bend at each power of two, and go on evenly as the first half of a float64; set"
-            f' {where}.type = "float64", and look at the other values of this device'
-        )
-        return
     # An angle may leap because it starts again after a turn.
     may_start_again = quantity in ("angle", "reference") and register.encoding == "binary"
-    leaps = None if may_start_again else sign_leap(register, where, values)
-    if leaps is not None:
-        yield leaps
+    of_bits = _wrong_type(register, where, new) or (
+        None if may_start_again else sign_leap(register, where, values)
+    )
+    # Nothing else is to be seen in values of which the bits are misread.
+    if of_bits is not None:
+        yield of_bits
         return
     if not register.turn and (rows := _at_an_end(register, values)):
         yield (
@@ -86,6 +75,23 @@ def misread(quantity: str, register: Register, where: str, values: NDArray) -> I
             "values turn round at 0 as those of a magnitude do, so that their sign is missing;"
             f" {remedy}"
         )
+
+
+def _wrong_type(register: Register, where: str, new: NDArray) -> str | None:
+    """Return of which encoding or type new values (n,) are, if it is not that of the register."""
+    keys = decimal_keys(register, new)
+    if keys:
+        written = " and ".join(
+            f'{key} = "{value}"' if isinstance(value, str) else f"{key} = {value}"
+            for key, value in keys.items()
+        )
+        return f"all digits are decimal, so the register is not binary; set {where}.{written}"
+    if is_half_of_float64(register, new):
+        return (
+            "values bend at each power of two, and go on evenly as the first half of a float64; set"
+            f' {where}.type = "float64", and look at the other values of this device'
+        )
+    return None
 
 
 def _is_about_middle(register: Register, values: NDArray) -> bool:

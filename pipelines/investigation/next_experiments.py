@@ -14,7 +14,7 @@ from pipelines.investigation.separating_design import (
     separating_design,
     separation,
 )
-from pipelines.investigation.separation import DECIDED, Separation
+from pipelines.investigation.separation import DECIDED, Separation, decided
 from pipelines.mechanics.geometry import Geometry
 from pipelines.mechanics.trajectory import Trajectory
 
@@ -27,7 +27,7 @@ class NextExperiment:
     """``motion``, ``repeat``, ``run`` or ``test``."""
     words: str
     decides: float
-    """Probability that one cause has at least ``DECIDED`` afterwards."""
+    """Probability that the true cause has at least ``DECIDED`` afterwards."""
 
 
 @dataclass(frozen=True)
@@ -86,10 +86,9 @@ def next_experiments(
 
 
 def _decides(separated: Separation) -> float:
-    """Return the probability that an experiment decides, over all truths."""
-    decided = (separated.posterior().max(axis=-1) >= DECIDED).mean(axis=-1)
-    prior = [sized_rival.rival.probability for sized_rival in separated.rivals]
-    return float(np.array(prior) @ decided)
+    """Return the probability that an experiment decides for the true cause, over all truths."""
+    prior = np.array([one.rival.probability for one in separated.rivals])
+    return float(prior @ decided(separated.posterior()))
 
 
 def _decides_by_hand(rival: Rival, rivals: Sequence[Rival]) -> float:

@@ -165,16 +165,16 @@ def sized(rivals: Sequence[Rival], problem: DetectionProblem) -> list[SizedRival
     for rival in rivals:
         if not rival.effect.shows_in(motions):
             raise InputError(
-                f"{SETTING}: {rival.label} cannot show in planned runs, which have no"
-                " temperatures; leave it out"
+                f"{rival.label} cannot show in planned runs, which have no temperatures; give"
+                f" `exoid design {SETTING}` the other causes"
             )
     fitted = next((_length(rival.term, problem) for rival in rivals if rival.term), None)
     result = [_sized(rival, problem, fitted) for rival in rivals]
     for one in result:
         if not one.truths:
             raise InputError(
-                f"{SETTING}: {one.rival.label} makes no torque with the last excitation; leave it"
-                " out, or give that run a wider motion"
+                f"{one.rival.label} makes no torque with the last excitation; give `exoid design"
+                f" {SETTING}` the other causes, or that run a wider motion"
             )
     return result
 

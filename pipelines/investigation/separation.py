@@ -119,7 +119,7 @@ class Separation:
             ],
             "expected_log_odds": self.log_odds().tolist(),
             "expected_posterior": posterior.mean(axis=1).tolist(),
-            "decided": [float(np.mean(of[:, i] >= DECIDED)) for i, of in enumerate(posterior)],
+            "decided": decided(posterior).tolist(),
         }
 
     def _against(self, truth: Appearance, rivals: Sequence[Appearance]) -> float:
@@ -169,6 +169,18 @@ class Separation:
             log = evidence.T + prior - prices
             result[i] = np.exp(log - logsumexp(log, axis=1, keepdims=True))
         return result
+
+
+def decided(posterior: NDArray) -> NDArray:
+    """Return the share of experiments (R,) after which each true cause has ``DECIDED``.
+
+    Parameters
+    ----------
+    posterior : (R, draws, R) array
+        Truth, experiment, rival, as of ``Separation.posterior``.
+    """
+    of_truth = np.diagonal(posterior, axis1=0, axis2=2)
+    return np.mean(of_truth >= DECIDED, axis=0)
 
 
 def _squared(x: NDArray) -> NDArray:

@@ -103,6 +103,7 @@ def test_a_decimal_point_that_moves_is_named():
         ({"type": "uint", "sign_bit": -1}, {"type": "uint"}, "and sign_bit = {sign}"),
         ({"type": "uint", "sign_bit": -1}, {"type": "int"}, "and sign_bit = {sign}"),
         ({"type": "int"}, {"type": "uint"}, 'type = "int{bits}"'),
+        ({"type": "int"}, {"type": "uint", "sign_bit": -1}, "and leave sign_bit out"),
         ({"type": "int"}, {"type": "int"}, ""),
     ],
 )
@@ -116,6 +117,14 @@ def test_a_misread_sign_is_named_in_registers_of_any_length(device, used, named,
     texts = list(misread("torque", Register(address=0, **used), "x", values))
     assert len(texts) == bool(named)
     assert all(named.format(bits=bits, sign=bits - 1) in text for text in texts)
+
+
+def test_a_direction_of_a_value_with_a_sign_of_its_own_is_named():
+    true = np.round(1000 * SWING)
+    register = Register(address=0, type="uint16", direction={"address": 1, "negative": 1})
+    values = np.where(true < 0.0, -(true % 65536.0), true)
+    (text,) = misread("torque", register, "x", values)
+    assert 'set x.type = "int16" and leave direction out' in text
 
 
 def test_too_few_values_show_nothing():

@@ -8,7 +8,7 @@ import pytest
 from exoid_cli.app import run
 from pipelines.contracts import TRAJECTORY
 from pipelines.settings import datasets
-from tests.report.sessions import decision_of, write_verdict
+from tests.report.sessions import AXIS, decision_of, write_verdict
 
 PUBLISHED = str(datasets() / "paper" / "trajectory.toml")
 QUICK = "[design]\nharmonics = 2\nparticles = 16\niterations = 25\nseed = 4\n"
@@ -114,9 +114,27 @@ def test_an_excitation_that_decides_between_causes_is_written_with_what_to_expec
     assert metadata["criterion_value"] == pytest.approx(min(odds[0, 1], odds[1, 0]))
     assert np.array(found["expected_posterior"]).sum(axis=1) == pytest.approx(1.0)
     # Judged as any other excitation, it separates them as it says.
-    assert run(["design", "--evaluate", str(out), "--separate", *PAIR, "--json"]) == 0
+    options = ["--separate", *PAIR, "--config", config, "--json"]
+    assert run(["design", "--evaluate", str(out), *options]) == 0
     judged = json.loads(capsys.readouterr().out)["separation"]
-    assert np.array(judged["expected_posterior"]).shape == (2, 2)
+    assert np.array(judged["expected_log_odds"]) == pytest.approx(odds)
+
+
+def test_a_known_effect_is_no_cause_to_separate(tmp_path, capsys):
+    config = tmp_path / "exoid.toml"
+    config.write_text('[diagnose]\nknown = ["rotor_inertia@knee"]\n')
+    labels = ["rotor_inertia@knee", "base_tilt"]
+    out = tmp_path / "next.parquet"
+    options = ["--separate", *labels, "--config", str(config), "-o", str(out)]
+    assert run(["design", *options]) == 2
+    assert "rotor_inertia@knee is in diagnose.known" in capsys.readouterr().err
+
+
+def test_a_verdict_of_another_machine_is_refused_for_that(tmp_path, monkeypatch, capsys):
+    write_verdict(tmp_path, AXIS, **decision_of(AXIS))
+    monkeypatch.chdir(tmp_path)
+    assert run(["design", "--from", "diagnosed", "-o", "next.parquet"]) == 2
+    assert "expected hip and knee" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(
@@ -140,22 +158,38 @@ def test_a_question_that_no_excitation_answers_ends_in_one_line(
     assert not list(tmp_path.glob("*.parquet"))
 
 
+def leave_open(folder, effect, joint):
+    """Let a verdict leave open whether the base is tilted, or another cause is there."""
+    document = json.loads((folder / "verdict.json").read_text())
+    tie = document["findings"][0]["causes"][0]
+    document["findings"][0]["causes"] = [
+        {**tie, "effect": "base_tilt", "joint": None, "probability": 0.6},
+        {**tie, "effect": effect, "joint": joint, "probability": 0.3},
+    ]
+    document["causes"] = []
+    (folder / "verdict.json").write_text(json.dumps(document))
+
+
 def test_next_says_what_decides_and_writes_the_motion(tmp_path, config, capsys):
     write_verdict(tmp_path, **decision_of(ties=()))
     folder = tmp_path / "diagnosed"
     assert run(["next", str(folder), "--config", config]) == 2
     assert "leaves no choice of causes" in capsys.readouterr().err
-    document = json.loads((folder / "verdict.json").read_text())
-    tie = document["findings"][0]["causes"][0]
-    document["findings"][0]["causes"] = [
-        {**tie, "effect": "base_tilt", "joint": None, "probability": 0.6},
-        {**tie, "effect": "rotor_inertia", "joint": "knee", "probability": 0.3},
-    ]
-    document["causes"] = []
-    (folder / "verdict.json").write_text(json.dumps(document))
+    leave_open(folder, "rotor_inertia", "knee")
     out = tmp_path / "next.parquet"
     assert run(["next", str(folder), "--config", config, "-o", str(out)]) == 0
     printed = capsys.readouterr().out
     assert "Open: base tilt (0.67) or rotor inertia at the knee (0.33)." in printed
     assert all(f"\n{what} " in printed for what in ("repeat", "motion", "run", "test"))
     assert TRAJECTORY.read(out).metadata["criterion"] == "separation"
+
+
+def test_next_says_that_it_writes_no_motion_where_none_separates_the_causes(
+    tmp_path, config, capsys
+):
+    write_verdict(tmp_path, **decision_of(ties=()))
+    folder, out = tmp_path / "diagnosed", tmp_path / "next.parquet"
+    leave_open(folder, "encoder_offset", "hip")
+    assert run(["next", str(folder), "--config", config, "-o", str(out)]) == 0
+    assert f"{out}: not written, as no motion" in " ".join(capsys.readouterr().err.split())
+    assert not out.exists()

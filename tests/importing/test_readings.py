@@ -3,6 +3,7 @@
 import json
 
 import numpy as np
+import pandas as pd
 import pytest
 from numpy.testing import assert_allclose
 
@@ -631,6 +632,15 @@ def test_rows_whose_values_are_no_measurements_are_named(imported, pendulum, wri
     outcome = imported(write_csv(pendulum.columns() | {"Angle.Quality": labels}))
     assert outcome.code == 0
     assert "'Angle.Quality' is Good in 1 920 rows, Bad in 80 rows; all kept" in outcome.printed
+
+
+def test_dates_in_a_column_that_is_named_as_a_label_are_no_labels(imported, pendulum, tmp_path):
+    path = tmp_path / "log.parquet"
+    dates = pd.date_range("2026-01-31", periods=2, freq="D").repeat(1000)
+    pd.DataFrame(pendulum.columns() | {"valid_from": dates}).to_parquet(path)
+    outcome = imported(path)
+    assert outcome.code == 0, outcome.err
+    assert "valid_from" not in outcome.printed
 
 
 @pytest.mark.parametrize("name", ["joint_speed", "axis_temperature", "motor", "leg_id_rms"])

@@ -44,6 +44,17 @@ def test_a_motion_is_advised_where_the_last_one_cannot_decide(usual):
     assert not decides(result, "run")
 
 
+def test_a_decision_for_the_wrong_cause_does_not_count(usual):
+    # On the usual motion a passive torque of one amplitude looks like a spring of two.
+    labels = ("passive_joint_torque@hip", "parallel_spring@hip")
+    result = compared(usual, (0.6, 0.4), *labels, kinds=("with_human",))
+    assert result.design is not None
+    odds = result.design.before.log_odds()
+    assert odds[0, 1] > 10.0 and odds[1, 0] < 0.0
+    (again,), (motion,) = decides(result, "repeat"), decides(result, "motion")
+    assert again <= 0.65 and motion > again
+
+
 def test_where_no_motion_separates_causes_a_test_by_hand_does(usual):
     result = compared(usual, (0.6, 0.4), "base_tilt", "encoder_offset@hip", kinds=("exo_alone",))
     assert result.design is None

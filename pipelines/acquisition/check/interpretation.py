@@ -12,8 +12,9 @@ from pipelines.modbus.register_block import Block
 from pipelines.settings.rig import Register
 from pipelines.settings.rig.register import DIGITS, DIMENSION, REGISTERS, RegisterType
 
-# Many manuals do not name the order of words, so a wrong one is likelier than a wrong type.
-_COST = {"word_order": 1, "type": 2}
+# Many manuals do not name the order of words, so a wrong one is likelier than a wrong type. Decimal
+# digits are rare.
+_COST = {"word_order": 1, "type": 2, "encoding": 3}
 
 
 @dataclass(frozen=True)
@@ -63,7 +64,9 @@ def _interpretations(name: str, block: Block) -> Iterator[Interpretation]:
     for encoding in DIGITS if is_binary else ():
         kind = was.type if encoding == "mod10" else f"uint{16 * was.registers}"
         update = {"encoding": encoding} | ({"type": kind} if kind != was.type else {})
-        yield Interpretation(was.model_copy(update=update), False, _written(update, False), 3)
+        yield Interpretation(
+            was.model_copy(update=update), False, _written(update, False), _COST["encoding"]
+        )
     for unit in DIMENSION[name]:
         if unit != was.unit:
             register = was.model_copy(update={"unit": unit})

@@ -51,8 +51,7 @@ def check(labels: Mapping[str, NDArray]) -> Iterator[Finding]:
     """
     for name, values in labels.items():
         counts = pd.Series(values).dropna().value_counts()
-        is_label = values.dtype.kind in "OUSbiu" or np.all(counts.index == np.round(counts.index))
-        if not (is_label and 1 < len(counts) <= MOST):
+        if not (_are_labels(values) and 1 < len(counts) <= MOST):
             continue
         some = ", ".join(f"{value} in {counted(n, 'row')}" for value, n in counts[:3].items())
         if _kind(name) == "quality":
@@ -60,3 +59,11 @@ def check(labels: Mapping[str, NDArray]) -> Iterator[Finding]:
         else:
             action = "all kept as one machine; if they are of several, give each a file of its own"
         yield Finding("rows", f"{name!r} is {some}", action)
+
+
+def _are_labels(values: NDArray) -> bool:
+    """Return whether values (n,) are text or whole numbers; dates and measurements are not."""
+    if values.dtype.kind == "f":  # whole numbers become floats where some are missing
+        known = values[np.isfinite(values)]
+        return bool(np.all(known == np.round(known)))
+    return values.dtype.kind in "OUSbiu"
