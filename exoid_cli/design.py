@@ -76,7 +76,7 @@ def design(
     if bool(causes) != separate or (separate and verdict):
         raise InputError(
             "expected causes after --separate, or --from DIR that names them, one of the two; as in"
-            " `exoid design --separate parallel_spring@knee rotor_inertia@knee -o next.parquet`"
+            " `exoid design --separate EFFECT@JOINT EFFECT@JOINT -o next.parquet`"
         )
     decides = separate or verdict is not None
     if decides and not evaluate and not output:

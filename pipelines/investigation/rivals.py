@@ -92,7 +92,7 @@ def rivals_named(labels: Sequence[str], machine: Machine) -> list[Rival]:
     if len(labels) < 2 or len(set(labels)) < len(labels):
         raise InputError(
             f"{SETTING}: found {', '.join(labels) or 'no cause'}, expected two different causes or"
-            " more, such as parallel_spring@knee rotor_inertia@knee"
+            " more, each as EFFECT@JOINT; `exoid effects` lists them"
         )
     effects = [effect_at(label, machine, _is_cause, SETTING) for label in labels]
     return [Rival(effect, 1.0 / len(effects)) for effect in effects]

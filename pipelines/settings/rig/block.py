@@ -110,11 +110,12 @@ def check_counter(register: Register, name: str) -> None:
     ValueError
         It has a scale, an offset, a sign or decimal digits; names its place in the file.
     """
-    is_plain = register.encoding == "binary" and register.is_unsigned
+    encoded = {"encoding", "sign_bit", "direction"} & register.model_fields_set
+    is_plain = register.is_unsigned and not encoded
     if not is_plain or (register.scale, register.offset) != (1.0, 0.0):
         *others, last = (kind for kind, code in STRUCT_CODES.items() if code.isupper())
         raise ValueError(
             f"{name}: found {register.type} with scale {register.scale:g} and offset"
             f" {register.offset:g}, expected {', '.join(others)} or {last} without scale or offset"
-            f"{'' if is_plain else ', and no encoding, sign_bit or direction'}"
+            f"{f'; remove {min(encoded)}' if encoded else ''}"
         )
