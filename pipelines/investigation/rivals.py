@@ -63,15 +63,31 @@ class Appearance:
     @classmethod
     def of(cls, candidate: Candidate, problem: DetectionProblem) -> "Appearance":
         """Compute it for a rival's shape in planned or recorded runs."""
-        runs = problem.runs
+        torque = unit_torque(candidate, problem)
         if candidate.transforms_motion:
-            torque = problem.remainder(bend(candidate, problem))
-            return cls(torque[:, 0], orthonormal(torque))
-        columns = [torque_columns(candidate, r, run) for r, run in enumerate(runs)]
-        own = candidate.columns_in([run.motion.run for run in runs])
-        span = problem.remainder([own.expand(column, r) for r, column in enumerate(columns)])
-        unit = problem.remainder(direction_of(candidate.effect, columns, problem))
-        return cls(unit[:, 0], orthonormal(span))
+            return cls(torque, orthonormal(torque[:, np.newaxis]))
+        own = candidate.columns_in([run.motion.run for run in problem.runs])
+        columns = enumerate(_columns(candidate, problem))
+        return cls(torque, orthonormal(problem.remainder([own.expand(c, r) for r, c in columns])))
+
+
+def unit_torque(candidate: Candidate, problem: DetectionProblem) -> NDArray:
+    """Return a candidate's torque at amplitude 1 in the rows of a problem, (rows,).
+
+    Without what the baseline explains, in units of the noise.
+    """
+    return problem.remainder(_direction(candidate, problem))[:, 0]
+
+
+def _direction(candidate: Candidate, problem: DetectionProblem) -> list[NDArray]:
+    """Return the torque at amplitude 1, (m, O, 1) of each run."""
+    if candidate.transforms_motion:
+        return bend(candidate, problem)
+    return direction_of(candidate.effect, _columns(candidate, problem), problem)
+
+
+def _columns(candidate: Candidate, problem: DetectionProblem) -> list[NDArray]:
+    return [torque_columns(candidate, r, run) for r, run in enumerate(problem.runs)]
 
 
 def rivals_named(labels: Sequence[str], machine: Machine) -> list[Rival]:
@@ -183,9 +199,9 @@ def _length(term: Term, problem: DetectionProblem) -> float:
     """Return the length of a fitted term's torque in the rows of a problem."""
     candidate = _candidate(term, problem)
     if candidate.transforms_motion:
-        return float(np.linalg.norm(Appearance.of(candidate, problem).torque))
-    columns = (torque_columns(candidate, r, run) for r, run in enumerate(problem.runs))
-    return float(np.linalg.norm(problem.remainder([c @ term.linear[:, None] for c in columns])))
+        return float(np.linalg.norm(unit_torque(candidate, problem)))
+    torque = [c @ term.linear[:, np.newaxis] for c in _columns(candidate, problem)]
+    return float(np.linalg.norm(problem.remainder(torque)))
 
 
 def _candidate(term: Term, problem: DetectionProblem) -> Candidate:
@@ -205,15 +221,9 @@ def _sized(rival: Rival, problem: DetectionProblem, fitted: float | None) -> Siz
 
 def _amplitude(candidate: Candidate, problem: DetectionProblem, fitted: float | None) -> float:
     """Return the amplitude at which a candidate makes the fitted torque, or a usual one."""
-    effect, runs = candidate.effect, problem.runs
     if fitted is not None:
-        length = float(np.linalg.norm(Appearance.of(candidate, problem).torque))
+        length = float(np.linalg.norm(unit_torque(candidate, problem)))
         return fitted / length if length > 0.0 else np.inf
-    if candidate.transforms_motion:
-        direction = bend(candidate, problem)
-    else:
-        columns = [torque_columns(candidate, r, run) for r, run in enumerate(runs)]
-        direction = direction_of(effect, columns, problem)
-    share = float(np.mean(CRITERIA.amplitudes))
-    rms = problem.rms(effect, direction)
+    effect, share = candidate.effect, float(np.mean(CRITERIA.amplitudes))
+    rms = problem.rms(effect, _direction(candidate, problem))
     return share * float(problem.torque_rms[problem.joint(effect)]) / rms if rms > 0.0 else np.inf

@@ -25,7 +25,7 @@ from pipelines.diagnosis.detectability.detectability import NEVER_APART
 from pipelines.diagnosis.detectability.detection_problem import DetectionProblem
 from pipelines.diagnosis.detectability.directions import orthonormal
 from pipelines.diagnosis.selection.marginal_likelihood import power
-from pipelines.investigation.rivals import Appearance, SizedRival
+from pipelines.investigation.rivals import Appearance, SizedRival, unit_torque
 
 DECIDED = 0.95
 """Posterior probability of one rival from which the others are excluded."""
@@ -55,16 +55,30 @@ class Separation:
         problem : DetectionProblem
             Planned or recorded runs.
         """
-        truths = _truths(rivals, problem)
         # The mean over all truths: the rivals stand for one torque.
-        squares = np.mean([one.torque**2 for own in truths for one in own], axis=0)
+        squares = np.mean(
+            [
+                (amplitude * unit_torque(candidate, problem)) ** 2
+                for sized in rivals
+                for candidate, amplitude in sized.truths
+            ],
+            axis=0,
+        )
         explained = np.bincount(problem.outputs, squares, minlength=len(problem.root))
         weights = power(explained, 1.0, CRITERIA.model_error)
         weighted = problem.weighted(weights)
+        looks = [{one: Appearance.of(one, weighted) for one in sized.shapes} for sized in rivals]
+        truths = (
+            tuple(
+                replace(own[candidate], torque=amplitude * own[candidate].torque)
+                for candidate, amplitude in sized.truths
+            )
+            for sized, own in zip(rivals, looks, strict=True)
+        )
         return cls(
             tuple(rivals),
-            _truths(rivals, weighted),
-            tuple(tuple(Appearance.of(c, weighted) for c in sized.shapes) for sized in rivals),
+            tuple(truths),
+            tuple(tuple(own.values()) for own in looks),
             0.5 * float(np.log(problem.independent)),
             np.sqrt(weights[problem.outputs]),
         )
@@ -186,16 +200,3 @@ def decided(posterior: NDArray) -> NDArray:
 def _squared(x: NDArray) -> NDArray:
     """Return the sum of squares along the last axis."""
     return np.sum(x * x, axis=-1)
-
-
-def _truths(
-    rivals: Sequence[SizedRival], problem: DetectionProblem
-) -> tuple[tuple[Appearance, ...], ...]:
-    """Return how each rival looks as the true cause, at each of its probable shapes."""
-    return tuple(
-        tuple(
-            replace(one := Appearance.of(candidate, problem), torque=amplitude * one.torque)
-            for candidate, amplitude in sized.truths
-        )
-        for sized in rivals
-    )
