@@ -113,8 +113,7 @@ def _evaluate(
     last: "tuple[str, Trajectory] | None",
 ) -> None:
     from pipelines.design.quality import quality
-    from pipelines.investigation.rivals import sized
-    from pipelines.investigation.separating_design import separation
+    from pipelines.investigation.separating_design import separation, separation_of_last
     from pipelines.mechanics.trajectory import read_trajectory
 
     trajectory = read_trajectory(file)
@@ -123,7 +122,8 @@ def _evaluate(
     if question and last:
         rivals, runs = question
         # As large as in the last excitation, as a design supposes them.
-        separated = separation(sized(rivals, runs.problem(last[1], rivals)), runs, trajectory)
+        before = separation_of_last(rivals, runs, last[1])
+        separated = separation(before.rivals, runs, trajectory)
     document = {"separation": separated.as_json()} if separated else {}
     console.emit({"file": str(file), **result.as_metadata(), **document})
     _show(str(file), result)
@@ -139,11 +139,12 @@ def _separate(
     last: "tuple[str, Trajectory]",
     mechanism: dict[str, Any],
 ) -> None:
-    from pipelines.investigation.separating_design import separating_design
+    from pipelines.investigation.separating_design import separating_design, separation_of_last
 
     rivals, runs = question
+    before = separation_of_last(rivals, runs, last[1])
     with console.progress("designing", total=1.0) as report:
-        result = separating_design(rivals, runs, geometry, last[1], report)
+        result = separating_design(before, runs, geometry, report)
     write_excitation(output, result.design, result.metadata(), geometry, mechanism)
     _warn_of_cut(result.design)
     console.emit({"file": str(output), **result.metadata()})

@@ -8,11 +8,12 @@ import numpy as np
 from pipelines.design.search import Report
 from pipelines.errors import NotIdentifiable
 from pipelines.investigation.planned import PlannedRuns
-from pipelines.investigation.rivals import Rival, sized
+from pipelines.investigation.rivals import Rival
 from pipelines.investigation.separating_design import (
     SeparatingDesign,
     separating_design,
     separation,
+    separation_of_last,
 )
 from pipelines.investigation.separation import DECIDED, Separation, decided
 from pipelines.mechanics.geometry import Geometry
@@ -62,21 +63,19 @@ def next_experiments(
     report : callable, optional
         Called with the share that is done, 0 to 1, and a note.
     """
-    known = sized(rivals, runs.problem(last, rivals))
-    again = separation(known, runs, last)
+    again = separation_of_last(rivals, runs, last)
     experiments = [NextExperiment("repeat", "record the same motion again", _decides(again))]
     design: SeparatingDesign | None = None
     words, decides = "record another motion, which separates the causes best", 0.0
     try:
-        design = separating_design(rivals, runs, geometry, last, report)
+        design = separating_design(again, runs, geometry, report)
         decides = _decides(design.separation)
     except NotIdentifiable:
         words = "no motion within [design.bounds] separates two of them"
     experiments.append(NextExperiment("motion", words, decides))
     for kind in {"exo_alone", "with_human"} - set(runs.kinds):
-        other = replace(runs, kinds=(kind,))
-        words = f"record {kind} runs, too"
-        experiments.append(NextExperiment("run", words, _decides(separation(known, other, last))))
+        other = separation(again.rivals, replace(runs, kinds=(kind,)), last)
+        experiments.append(NextExperiment("run", f"record {kind} runs, too", _decides(other)))
     for rival in rivals:
         decides = _decides_by_hand(rival, rivals)
         experiments.append(NextExperiment("test", rival.effect.confirm, decides))

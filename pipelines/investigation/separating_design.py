@@ -52,10 +52,9 @@ class SeparatingDesign:
 
 
 def separating_design(
-    rivals: Sequence[Rival],
+    before: Separation,
     runs: PlannedRuns,
     geometry: Geometry,
-    last: Trajectory,
     report: Report = lambda done, note: None,
 ) -> SeparatingDesign:
     """Design the excitation that separates rivals best.
@@ -64,14 +63,12 @@ def separating_design(
 
     Parameters
     ----------
-    rivals : sequence of Rival
-        Two or more.
+    before : Separation
+        Of the excitation that did not separate them, or a usual one.
     runs : PlannedRuns
         With the settings of the search.
     geometry : Geometry
         Lengths and gravity.
-    last : Trajectory
-        The excitation that did not separate them, or a usual one.
     report : callable, optional
         Called with the share that is done, 0 to 1, and a note.
 
@@ -80,13 +77,22 @@ def separating_design(
     NotIdentifiable
         Where no motion within the bounds separates two of them.
     """
-    known = sized(rivals, runs.problem(last, rivals))
-    trajectory, stopped_by = _search(known, runs, geometry, report)
+    trajectory, stopped_by = _search(before.rivals, runs, geometry, report)
     settings = runs.settings
     design = Design(trajectory, quality(trajectory, settings, geometry), settings, stopped_by)
-    return SeparatingDesign(
-        design, separation(known, runs, trajectory), separation(known, runs, last)
-    )
+    return SeparatingDesign(design, separation(before.rivals, runs, trajectory), before)
+
+
+def separation_of_last(rivals: Sequence[Rival], runs: PlannedRuns, last: Trajectory) -> Separation:
+    """Return how well the runs with the last excitation separate rivals, which it sizes.
+
+    Raises
+    ------
+    InputError
+        Where such runs cannot show a rival.
+    """
+    problem = runs.problem(last, rivals)
+    return Separation.of(sized(rivals, problem), problem)
 
 
 def separation(

@@ -20,8 +20,7 @@ from pipelines.effects import EFFECTS
 from pipelines.errors import NotIdentifiable
 from pipelines.investigation.planned import PlannedRuns
 from pipelines.investigation.rivals import Rival, sized
-from pipelines.investigation.separating_design import separating_design, separation
-from pipelines.investigation.separation import Separation
+from pipelines.investigation.separating_design import separating_design, separation_of_last
 from pipelines.mechanics.geometry import Geometry
 from pipelines.mechanics.kinematics import motion_table
 from pipelines.mechanics.machine import THE_LEG
@@ -52,8 +51,7 @@ def undecided_pairs(usual: Trajectory) -> Iterator[tuple[Rival, Rival]]:
     plain = [e for e in effects if not e.per_run and not any(p.per_run for p in e.linear)]
     for one, other in itertools.combinations(plain, 2):
         rivals = (Rival(one, 0.5), Rival(other, 0.5))
-        problem = RUNS.problem(usual, rivals)
-        separated = Separation.of(sized(rivals, problem), problem)
+        separated = separation_of_last(rivals, RUNS, usual)
         if min(separated.as_json()["decided"]) < UNDECIDED and not separated.inseparable():
             yield rivals
 
@@ -99,13 +97,13 @@ def main(pairs: int, seed: int) -> None:
     for one, other in drawn[:pairs]:
         rivals = (one, other)
         try:
-            result = separating_design(rivals, RUNS, Geometry(), usual)
+            result = separating_design(separation_of_last(rivals, RUNS, usual), RUNS, Geometry())
         except NotIdentifiable as error:
             print(f"| {one.label} | {other.label} | {error} |", flush=True)
             continue
         motions = (usual, result.design.trajectory)
-        known = sized(rivals, RUNS.problem(usual, rivals))
-        predicted = [separation(known, RUNS, t).as_json()["expected_posterior"] for t in motions]
+        judged = (result.before, result.separation)
+        predicted = [one.as_json()["expected_posterior"] for one in judged]
         for number in (0, 1):
             term = truth_of(rivals, number, usual)
             true, rival = rivals[number].label, rivals[1 - number].label

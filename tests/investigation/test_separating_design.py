@@ -18,7 +18,11 @@ from pipelines.investigation.rivals import (
     rivals_named,
     sized,
 )
-from pipelines.investigation.separating_design import separating_design, separation
+from pipelines.investigation.separating_design import (
+    separating_design,
+    separation,
+    separation_of_last,
+)
 from pipelines.investigation.separation import DECIDED
 from pipelines.mechanics.geometry import Geometry
 from pipelines.mechanics.limits import margins
@@ -83,19 +87,21 @@ def test_a_simulated_decision_is_seldom_wrong(usual, share):
 
 
 def test_a_design_decides_what_the_usual_excitation_leaves_open(usual):
-    result = separating_design(named(*HARD), RUNS, Geometry(), usual)
+    result = separating_design(separation_of_last(named(*HARD), RUNS, usual), RUNS, Geometry())
     assert result.separation.least() > 2.0 * result.before.least()
     decided = [np.mean(one.as_json()["decided"]) for one in (result.before, result.separation)]
     assert decided[1] > decided[0] + 0.25
     # As any excitation, it keeps its bounds at every time, and is found again.
     assert all(margin.kept for margin in margins(result.design.trajectory, QUICK.bounds))
-    again = separating_design(named(*HARD), RUNS, Geometry(), usual).design.trajectory
+    again = separating_design(
+        separation_of_last(named(*HARD), RUNS, usual), RUNS, Geometry()
+    ).design.trajectory
     assert np.array_equal(again.a, result.design.trajectory.a)
 
 
 def test_where_a_motion_surely_decides_the_parameters_count(usual):
     quick = replace(RUNS, settings=QUICK.changed(particles=12))
-    result = separating_design(named(*EASY), quick, Geometry(), usual)
+    result = separating_design(separation_of_last(named(*EASY), quick, usual), quick, Geometry())
     assert result.separation.least() > 20.0
     assert result.design.quality.log_det > design(QUICK).quality.log_det - 4.0
 
@@ -106,7 +112,7 @@ def test_where_a_motion_surely_decides_the_parameters_count(usual):
 )
 def test_causes_that_no_motion_separates_are_refused(pair, usual):
     with pytest.raises(NotIdentifiable, match=f"no motion .* separates {pair[0]} and {pair[1]}"):
-        separating_design(named(*pair), RUNS, Geometry(), usual)
+        separating_design(separation_of_last(named(*pair), RUNS, usual), RUNS, Geometry())
 
 
 @pytest.mark.parametrize(
