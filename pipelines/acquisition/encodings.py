@@ -4,7 +4,7 @@ Binary values have digits above 9 and words above 9999. A register that never ha
 unless by chance, which becomes small with each value that could have had one.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from math import ceil, isnan
 from operator import itemgetter
 
@@ -37,9 +37,9 @@ def decimal_keys(register: Register, values: NDArray) -> dict[str, str | int]:
     """
     if not _is_judged(register):
         return {}
-    bits, raw = 16 * register.registers, _raw(register, values)
+    raw = _raw(register, values)
     shown: list[tuple[float, dict[str, str | int]]] = []
-    for keys in _possible_keys(register.type, bits):
+    for keys in _possible_keys(register.type, register.bits):
         decimal = register.model_copy(update={"sign_bit": None, **keys})
         counts = _decoded(decimal, raw)
         if counts is not None and _is_no_chance(decimal, raw):
@@ -47,6 +47,14 @@ def decimal_keys(register: Register, values: NDArray) -> dict[str, str | int]:
     # A sign bit may be a digit, too; where it is, values leap.
     _, best = min(shown, key=itemgetter(0), default=(0.0, {}))
     return {key: value for key, value in best.items() if getattr(register, key) != value}
+
+
+def written_keys(keys: Mapping[str, str | float]) -> list[str]:
+    """Return keys and their values as a rig file has them."""
+    return [
+        f'{key} = "{value}"' if isinstance(value, str) else f"{key} = {value:g}"
+        for key, value in keys.items()
+    ]
 
 
 def is_gray(register: Register, values: NDArray) -> bool:
@@ -71,7 +79,7 @@ def is_gray(register: Register, values: NDArray) -> bool:
     for shift in (1, 2, 4, 8, 16):
         decoded ^= decoded >> shift
     # As binary numbers, the highest is next to the lowest: -1 to 0.
-    full = 2 ** (16 * register.registers)
+    full = 2**register.bits
     steps = np.diff(raw) % full
     way = float(np.minimum(steps, full - steps).sum())
     return float(np.abs(np.diff(decoded)).sum()) < least * way
@@ -124,8 +132,7 @@ def _raw(register: Register, values: NDArray) -> list[int]:
     read = np.round((values[np.isfinite(values)] - offset) / scale).astype(np.int64)
     if register.direction is not None:
         read = np.abs(read)
-    bits = 16 * register.registers
-    return [raw_of(register, count) % 2**bits for count in read.tolist()]
+    return [raw_of(register, count) % 2**register.bits for count in read.tolist()]
 
 
 def _possible_keys(kind: str, bits: int) -> Iterator[dict[str, str | int]]:
@@ -141,11 +148,9 @@ def _possible_keys(kind: str, bits: int) -> Iterator[dict[str, str | int]]:
 
 def _decoded(register: Register, raw: list[int]) -> NDArray | None:
     """Return the counts (n,) of bits, given as unsigned numbers; None if a digit is not decimal."""
-    bits, is_signed = 16 * register.registers, register.type.startswith("int")
     counts = []
     for one in raw:
-        typed = one - 2**bits if is_signed and one >= 2 ** (bits - 1) else one
-        counts.append(count_of(register, typed))
+        counts.append(count_of(register, register.typed(one)))
         if isnan(counts[-1]):
             return None
     return np.array(counts)
@@ -154,7 +159,7 @@ def _decoded(register: Register, raw: list[int]) -> NDArray | None:
 def _is_no_chance(register: Register, raw: list[int]) -> bool:
     """Return whether binary values (n,) would have had a digit that is not decimal."""
     width, base = DIGITS[register.encoding]
-    bits = 16 * register.registers
+    bits = register.bits
     if register.sign_bit is not None:  # a sign's digit is no evidence
         bits = bits - width if register.encoding == "bcd" else register.sign_bit
     share = (2 * base - 1 if register.type.startswith("int") else base) / 2**width

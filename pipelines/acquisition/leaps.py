@@ -64,9 +64,9 @@ def sign_leap(register: Register, where: str, values: NDArray) -> str | None:
             return None
         return (
             f"leaps by {full:.0f} counts where it changes its sign: set {where}.sign_bit ="
-            f" {16 * register.registers - 1}"
+            f" {register.bits - 1}"
         )
-    bits = 16 * register.registers
+    bits = register.bits
     if bits > 32 or register.encoding != "binary" or register.counts is None:
         return None
     full = leap(register, values)

@@ -5,7 +5,7 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from pipelines.acquisition.encodings import decimal_keys, is_gray, is_half_of_float64
+from pipelines.acquisition.encodings import decimal_keys, is_gray, is_half_of_float64, written_keys
 from pipelines.acquisition.leaps import sign_leap
 from pipelines.settings.rig import Register
 from pipelines.signals.cut_off import cut_off_at
@@ -81,10 +81,7 @@ def _wrong_type(register: Register, where: str, new: NDArray) -> str | None:
     """Return of which encoding or type new values (n,) are, if it is not that of the register."""
     keys = decimal_keys(register, new)
     if keys:
-        written = " and ".join(
-            f'{key} = "{value}"' if isinstance(value, str) else f"{key} = {value}"
-            for key, value in keys.items()
-        )
+        written = " and ".join(written_keys(keys))
         return f"all digits are decimal, so the register is not binary; set {where}.{written}"
     if is_half_of_float64(register, new):
         return (

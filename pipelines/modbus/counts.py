@@ -2,7 +2,7 @@
 
 from math import nan
 
-from pipelines.settings.rig.register import DIGITS, REGISTERS, STRUCT_CODES, Register
+from pipelines.settings.rig.register import DIGITS, STRUCT_CODES, Register
 
 
 def count_of(register: Register, raw: int) -> float:
@@ -52,7 +52,7 @@ def _from_digits(register: Register, raw: int) -> float:
     """Return the count of digits; those of a signed type have a sign each."""
     width, base = DIGITS[register.encoding]
     count = 0
-    for shift in range(16 * REGISTERS[register.type] - width, -1, -width):
+    for shift in range(register.bits - width, -1, -width):
         digit = raw >> shift & (2**width - 1)
         if not STRUCT_CODES[register.type].isupper() and digit >= 2 ** (width - 1):
             digit -= 2**width
@@ -70,7 +70,4 @@ def _to_digits(register: Register, count: int) -> int:
         rest, digit = divmod(rest, base)
         raw |= (-digit if count < 0 else digit) % 2**width << shift
         shift += width
-    bits = 16 * REGISTERS[register.type]
-    # A signed type takes the same bits as a negative number.
-    is_beyond = not STRUCT_CODES[register.type].isupper() and raw >= 2 ** (bits - 1)
-    return raw - 2**bits if is_beyond else raw
+    return register.typed(raw)

@@ -34,7 +34,7 @@ class Block:
         self._encoded = [
             (k, name, r)
             for k, (name, r) in enumerate(registers.items())
-            if r.encoding != "binary" or r.sign_bit is not None
+            if {"encoding", "sign_bit"} & set(r.encoding_keys)
         ]
         self._directions = [
             (name, r.direction, r.direction.address - self.address)

@@ -9,6 +9,7 @@ from pydantic import ValidationError
 
 from pipelines.modbus.register_block import Block
 from pipelines.settings.rig import Register
+from pipelines.settings.rig.block import check_counter
 from pipelines.settings.rig.register import REGISTERS, STRUCT_CODES
 from pipelines.settings.rig.register_map import SensorMap
 
@@ -279,6 +280,14 @@ def test_a_direction_in_another_register_is_the_sign_of_a_magnitude():
 def test_encodings_that_no_register_has_are_refused(keys, message):
     with pytest.raises(ValidationError, match=re.escape(message)):
         Register(address=0, **keys)
+
+
+def test_a_counter_may_say_that_it_is_binary():
+    counter = Register.model_validate({"address": 0, "type": "uint16", "encoding": "binary"})
+    check_counter(counter, "read.sequence")
+    digits = Register.model_validate({"address": 0, "type": "uint16", "encoding": "bcd"})
+    with pytest.raises(ValueError, match=r"read\.sequence: .*; remove encoding"):
+        check_counter(digits, "read.sequence")
 
 
 def test_units_become_si():

@@ -8,6 +8,7 @@ from typing import get_args
 from numpy.typing import NDArray
 
 from pipelines.acquisition.check.probe import Series
+from pipelines.acquisition.encodings import written_keys
 from pipelines.modbus.register_block import Block
 from pipelines.settings.rig import Register
 from pipelines.settings.rig.register import DIGITS, DIMENSION, REGISTERS, RegisterType
@@ -34,14 +35,13 @@ def _interpretations(name: str, block: Block) -> Iterator[Interpretation]:
     was = block.registers[name]
     others = (register for other, register in block.registers.items() if other != name)
     taken = {address for register in others for address in register.addresses}
-    is_encoded = bool(was.sign_bit or was.direction or was.encoding != "binary")
     for kind, order, swapped in product(get_args(RegisterType), ("big", "little"), (False, True)):
         # A longer type must not reach into another register, or beyond what was read.
         end = was.address + REGISTERS[kind]
         if end > block.address + block.count or taken & set(range(was.address, end)):
             continue
         # Other types may hold no sign bit, direction or digits.
-        if is_encoded and kind != was.type:
+        if was.encoding_keys and kind != was.type:
             continue
         # A single word has no order.
         if REGISTERS[kind] == 1 and order != was.word_order:
@@ -60,9 +60,10 @@ def _interpretations(name: str, block: Block) -> Iterator[Interpretation]:
             update["scale"] = 1.0  # a float is in its unit, not in counts
         register = was.model_copy(update=update)
         yield Interpretation(register, swapped, _written(update, swapped), cost)
-    is_binary = was.counts is not None and not is_encoded and name not in ("sequence", "time")
+    is_plain = was.counts is not None and not was.encoding_keys
+    is_binary = is_plain and name not in ("sequence", "time")
     for encoding in DIGITS if is_binary else ():
-        kind = was.type if encoding == "mod10" else f"uint{16 * was.registers}"
+        kind = was.type if encoding == "mod10" else f"uint{was.bits}"
         update = {"encoding": encoding} | ({"type": kind} if kind != was.type else {})
         yield Interpretation(
             was.model_copy(update=update), False, _written(update, False), _COST["encoding"]
@@ -74,11 +75,8 @@ def _interpretations(name: str, block: Block) -> Iterator[Interpretation]:
 
 
 def _written(update: dict, swapped: bool) -> str:
-    keys = [
-        f'{key} = "{value}"' if isinstance(value, str) else f"{key} = {value:g}"
-        for key, value in update.items()
-    ]
-    return " and ".join(keys + ["the two bytes of each register swapped"] * swapped)
+    swap = ["the two bytes of each register swapped"] * swapped
+    return " and ".join([*written_keys(update), *swap])
 
 
 def remedy(

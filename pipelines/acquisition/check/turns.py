@@ -3,8 +3,8 @@
 from collections.abc import Iterator
 
 from pipelines.acquisition.check.finding import Finding
-from pipelines.acquisition.check.leaps import leap_of
 from pipelines.acquisition.check.probe import Probe, Series
+from pipelines.acquisition.leaps import leap
 
 
 def check_turns(probe: Probe, series: Series) -> Iterator[Finding]:
@@ -17,7 +17,10 @@ def check_turns(probe: Probe, series: Series) -> Iterator[Finding]:
     series : Series
         Repeated readings of its block.
     """
-    full = leap_of(series, "angle", of_turn=True) if "angle" in series.block.names else None
+    register = series.block.registers.get("angle")
+    if register is None:
+        return
+    full = leap(register, series.of("angle")[series.fresh], of_turn=True)
     if full is not None:
         where = f"{probe.map_path}.read.angle"
         yield Finding(

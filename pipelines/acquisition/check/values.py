@@ -26,11 +26,12 @@ def check_values(probe: Probe, series: Series, rate_hz: float | None) -> Iterato
     for name, register in series.block.registers.items():
         if name in ("sequence", "time", "status"):
             continue
-        values = series.of(name)[series.fresh]
-        for text in misread(name, register, f"{probe.map_path}.read.{name}", values):
+        values = series.of(name)
+        where = f"{probe.map_path}.read.{name}"
+        for text in misread(name, register, where, values[series.fresh]):
             yield Finding(probe.name, f"{name}: {text}", name, is_explained=True)
         if rows is not None and name in ("angle", "torque", "current"):
-            for text in held(series.answered[rows], series.of(name)[rows]):
+            for text in held(series.answered[rows], values[rows]):
                 yield Finding(probe.name, f"{name}: {text}")
 
 

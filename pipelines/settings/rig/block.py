@@ -110,12 +110,12 @@ def check_counter(register: Register, name: str) -> None:
     ValueError
         It has a scale, an offset, a sign or decimal digits; names its place in the file.
     """
-    encoded = {"encoding", "sign_bit", "direction"} & register.model_fields_set
+    encoded = register.encoding_keys
     is_plain = register.is_unsigned and not encoded
     if not is_plain or (register.scale, register.offset) != (1.0, 0.0):
         *others, last = (kind for kind, code in STRUCT_CODES.items() if code.isupper())
         raise ValueError(
             f"{name}: found {register.type} with scale {register.scale:g} and offset"
             f" {register.offset:g}, expected {', '.join(others)} or {last} without scale or offset"
-            f"{f'; remove {min(encoded)}' if encoded else ''}"
+            f"{f'; remove {encoded[0]}' if encoded else ''}"
         )

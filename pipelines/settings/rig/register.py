@@ -200,6 +200,26 @@ class Register(Settings):
         return self._unsigned_bits > 0 and self.sign_bit is None and self.direction is None
 
     @property
+    def encoding_keys(self) -> tuple[str, ...]:
+        """Its keys that make it other than a plain number of its type."""
+        given = {
+            "encoding": self.encoding != "binary",
+            "sign_bit": self.sign_bit is not None,
+            "direction": self.direction is not None,
+        }
+        return tuple(key for key, is_given in given.items() if is_given)
+
+    @property
+    def bits(self) -> int:
+        """Bits of its registers."""
+        return 16 * self.registers
+
+    def typed(self, raw: int) -> int:
+        """Return its bits, an unsigned number, as a number of its type."""
+        is_signed = STRUCT_CODES[self.type].islower()
+        return raw - 2**self.bits if is_signed and raw >= 2 ** (self.bits - 1) else raw
+
+    @property
     def word(self) -> int:
         """Counts that one of its high word is worth."""
         return WORD if self.encoding == "binary" else 10_000
