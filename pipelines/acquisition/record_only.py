@@ -36,7 +36,7 @@ from pipelines.process.priority import urgent
 from pipelines.settings.acquire import RunSettings
 from pipelines.settings.mechanism import MechanismSettings
 from pipelines.settings.rig.recording_only import RecordingRig, load_recording_rig
-from pipelines.signals.power import GIVES_BACK, mean_power
+from pipelines.signals.power import absorbed_w
 
 Report = Callable[[float, int], None]
 """Takes the time since the recording began, s, and the number of rows."""
@@ -118,19 +118,12 @@ def misread_values(path: Path, rig_path: Path) -> list[str]:
 
 
 def _absorbed(frame: pd.DataFrame, rig: RecordingRig) -> Iterator[str]:
-    """Yield that drives take up energy on average, of all joints: one may move another's motor."""
-    powers = [
-        mean_power(
-            frame["time_s"].to_numpy(),
-            frame[f"{joint.joint}_angle_rad"].to_numpy(),
-            frame[f"{joint.joint}_torque_nm"].to_numpy(),
-        )
-        for joint in rig.drive
-    ]
-    mean, size = (sum(values) for values in zip(*powers, strict=True))
-    if mean < -GIVES_BACK * size:
+    """Yield that the drives take up energy on average."""
+    names = [("time_s", f"{j.joint}_angle_rad", f"{j.joint}_torque_nm") for j in rig.drive]
+    absorbed = absorbed_w(tuple(frame[name].to_numpy() for name in own) for own in names)
+    if absorbed is not None:
         yield (
-            f"the drives absorb {-mean:.3g} W on average, but friction must consume power; check"
+            f"the drives absorb {absorbed:.3g} W on average, but friction must consume power; check"
             " the signs of angles and torques (scale, direction)"
         )
 

@@ -8,6 +8,8 @@ slower, and one that friction makes leap has no slope before it.
 import numpy as np
 from numpy.typing import NDArray
 
+from pipelines.signals.resolution import smallest_step
+
 ROWS = 3
 """Least number of equal values in a row."""
 TIMES = 2
@@ -29,9 +31,7 @@ def cut_off_at(values: NDArray) -> tuple[float, ...]:
     known = values[np.isfinite(values)]
     if len(known) < ROWS:
         return ()
-    steps = np.abs(np.diff(np.unique(known)))
-    # Differences by rounding in float64 are no steps.
-    quantum = steps[steps > 1e-9 * np.abs(known).max()].min(initial=np.inf)
+    quantum = smallest_step(known)
     return tuple(
         float(end)
         for end, side in ((known.min(), -1.0), (known.max(), 1.0))

@@ -9,6 +9,8 @@ magnitude with the sign of something else turns round at zero, too, and leaps el
 import numpy as np
 from numpy.typing import NDArray
 
+from pipelines.signals.resolution import smallest_step
+
 CROSSINGS = 4
 """Least number of crossings of zero that are judged."""
 SHARE = 0.75
@@ -39,16 +41,14 @@ def is_folded(values: NDArray) -> bool:
 
 def _turns_round(values: NDArray) -> bool:
     """Return whether values (n,) turn round at zero as sharply as they came."""
-    steps = np.diff(np.unique(np.abs(values)))
-    # Differences by rounding in float64 are no steps.
-    steps = steps[steps > 1e-9 * np.abs(values).max()]
+    step = smallest_step(np.abs(values))
     ahead = 2.0 * values[1:-1] - values[:-2]
     # Noise and the smallest step let values turn round without any crossing.
     noise = float(np.median(np.abs(values[2:] - ahead)))
     # As if all came from above.
     side = np.sign(values[1:-1])
     ahead, after = side * ahead, side * values[2:]
-    crosses = ahead < -2.0 * max(steps.min(initial=np.inf), noise)
+    crosses = ahead < -2.0 * max(step, noise)
     far, came = -ahead[crosses], after[crosses]
     goes_on = came > 0.5 * far
     return bool(len(far) >= CROSSINGS and np.mean(goes_on) >= SHARE)

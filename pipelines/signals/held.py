@@ -3,6 +3,8 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from pipelines.signals.resolution import smallest_step
+
 MANY = 10
 """Least number of new values."""
 
@@ -38,12 +40,11 @@ def are_held(values: NDArray) -> bool:
     # A joint that rests repeats its values for long, whether they are held or not.
     rows = rows[rows <= 10 * np.median(rows)]
     repeats = 1.0 - len(rows) / rows.sum()
-    steps = np.diff(np.unique(values[new]))
-    # Differences by rounding in float64 are no steps.
-    steps = steps[steps > 1e-9 * np.ptp(values[new])]
-    if not len(steps):
+    # From the lowest on, as a large offset has no share in their rounding.
+    step = smallest_step(values[new] - values[new].min())
+    if np.isinf(step):
         return False
-    jump = float(np.median(np.abs(np.diff(values[new])))) / float(steps.min())
+    jump = float(np.median(np.abs(np.diff(values[new])))) / step
     # Noise with a median jump of k steps repeats a reading by chance in about one of 4 k rows. A
     # share four times as large, with a margin of 5 %, is not chance.
     return bool(repeats > 0.05 + 1.0 / jump)

@@ -1,5 +1,7 @@
 """The mean power of a drive, which shows whether its angle and torque have the same sign."""
 
+from collections.abc import Iterable, Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -7,6 +9,20 @@ SPAN = 20
 """Samples over which a velocity is taken: long against noise, short against a motion."""
 GIVES_BACK = 0.2
 """Share of the mean magnitude of power that drives may absorb on average."""
+
+
+def absorbed_w(drives: Iterable[Sequence[NDArray]]) -> float | None:
+    """Return the mean power that drives take up together, W; None where they deliver some.
+
+    A single one may take up power, because one joint's motion can drive another one's motor.
+
+    Parameters
+    ----------
+    drives : iterable of sequences of three (n,) arrays
+        Time, angle and torque of each, as of ``mean_power``.
+    """
+    means, sizes = zip(*(mean_power(*drive) for drive in drives), strict=True)
+    return -sum(means) if sum(means) < -GIVES_BACK * sum(sizes) else None
 
 
 def mean_power(time_s: NDArray, angle: NDArray, torque: NDArray) -> tuple[float, float]:

@@ -19,7 +19,7 @@ from pipelines.settings.import_map import ImportMap, JointSettings
 from pipelines.signals.cut_off import cut_off_at
 from pipelines.signals.folded import is_folded
 from pipelines.signals.held import new_values
-from pipelines.signals.power import GIVES_BACK, mean_power
+from pipelines.signals.power import absorbed_w
 from pipelines.signals.rescaled import is_rescaled
 
 STRONGEST = {"torque": 1e3, "force": 1e5}
@@ -71,9 +71,9 @@ def check(columns: Mapping[str, NDArray], settings: ImportMap) -> Iterator[Findi
         yield from _turns_on(columns, joint)
         yield from _slips(columns, joint)
         yield from _too_strong(columns, joint)
-        yield from _rescaled(columns, joint)
-        yield from _unsigned(columns, joint)
-        yield from _cut_off(columns, joint)
+        for quantity in _torque_of(joint):
+            name = joint.joint.column(quantity)
+            yield from _misread_torque(name, columns[name])
     yield from _copies(columns, settings.joint)
     joints = [joint.joint for joint in settings.joint]
     # Drives whose torque was not measured may do the work that the others absorb.
@@ -208,34 +208,21 @@ def _copies(columns: Mapping[str, NDArray], joints: Sequence[JointSettings]) -> 
             yield Finding(other, seen, action)
 
 
-def _rescaled(columns: Mapping[str, NDArray], joint: JointSettings) -> Iterator[Finding]:
-    """Report a torque that was logged with another factor now and then."""
-    for quantity in _torque_of(joint):
-        name = joint.joint.column(quantity)
-        if is_rescaled(columns[name][new_values(columns[name])]):
-            seen = "leaps by a factor of ten, and back, as a display whose decimal point moves"
-            yield Finding(name, seen, "kept; log it with one decimal point")
-
-
-def _unsigned(columns: Mapping[str, NDArray], joint: JointSettings) -> Iterator[Finding]:
-    """Report a torque without its sign, which may stand in another column."""
-    for quantity in _torque_of(joint):
-        name = joint.joint.column(quantity)
-        if is_folded(columns[name][new_values(columns[name])]):
-            seen = "turns round at 0 as a magnitude does, so its sign is missing or wrong"
-            action = "kept; where another column has it, let an expression multiply both"
-            yield Finding(name, seen, action)
-
-
-def _cut_off(columns: Mapping[str, NDArray], joint: JointSettings) -> Iterator[Finding]:
-    """Report a torque whose largest values were cut off, as by an amplifier."""
-    for quantity in _torque_of(joint):
-        name = joint.joint.column(quantity)
-        if ends := cut_off_at(columns[name]):
-            limits = " and ".join(f"{end:.4g}" for end in ends)
-            seen = f"comes to {limits} at full slope and stays there, so larger values are cut off"
-            action = "kept; log a larger range. If the drive limits its torque there, it is right"
-            yield Finding(name, seen, action)
+def _misread_torque(name: str, values: NDArray) -> Iterator[Finding]:
+    """Report a torque (n,) with another factor now and then, without its sign, or cut off."""
+    new = values[new_values(values)]
+    if is_rescaled(new):
+        seen = "leaps by a factor of ten, and back, as a display whose decimal point moves"
+        yield Finding(name, seen, "kept; log it with one decimal point")
+    if is_folded(new):
+        seen = "turns round at 0 as a magnitude does, so its sign is missing or wrong"
+        action = "kept; where another column has it, let an expression multiply both"
+        yield Finding(name, seen, action)
+    if ends := cut_off_at(values):
+        limits = " and ".join(f"{end:.4g}" for end in ends)
+        seen = f"comes to {limits} at full slope and stays there, so larger values are cut off"
+        action = "kept; log a larger range. If the drive limits its torque there, it is right"
+        yield Finding(name, seen, action)
 
 
 def _velocity(columns: Mapping[str, NDArray], joint: JointSettings) -> Iterator[Finding]:
@@ -258,15 +245,8 @@ def _velocity(columns: Mapping[str, NDArray], joint: JointSettings) -> Iterator[
 
 def _power(columns: Mapping[str, NDArray], joints: Sequence[JointSettings]) -> Iterator[Finding]:
     """Report drives that brake on average; a single one may, where another one moves it."""
-    powers = [_mean_power(columns, joint) for joint in joints]
-    # Over all joints, because one joint's motion can drive another one's motor.
-    mean, size = (sum(values) for values in zip(*powers, strict=True))
-    if mean < -GIVES_BACK * size:
-        seen = f"the drives absorb {-mean:.3g} W on average, but friction must consume power"
+    names = [("time_s", *map(joint.joint.column, ("angle", "torque"))) for joint in joints]
+    absorbed = absorbed_w(whole_rows(*(columns[name] for name in own)) for own in names)
+    if absorbed is not None:
+        seen = f"the drives absorb {absorbed:.3g} W on average, but friction must consume power"
         yield Finding("torque", seen, "kept; check the signs of angles and torques")
-
-
-def _mean_power(columns: Mapping[str, NDArray], joint: JointSettings) -> tuple[float, float]:
-    """Return the mean and the mean magnitude of a drive's power, W."""
-    names = [joint.joint.column(quantity) for quantity in ("angle", "torque")]
-    return mean_power(*whole_rows(columns["time_s"], *(columns[name] for name in names)))
