@@ -294,8 +294,7 @@ def _other_units(channels: Sequence[Channel], source: Source) -> Iterator[Findin
         if reading.column is None or "scale" in reading.model_fields_set:
             continue
         name = source.column_named(reading.column)
-        unit = source.units.get(name)
-        in_name = unit_in(f"{TWIN.sub('', name)} [{unit}]" if unit else TWIN.sub("", name))
+        in_name = unit_in(_with_unit(name, source))
         if in_name is None or not in_name.decides or in_name.doubt:
             continue
         known = UNITS.get(in_name.unit or "")
@@ -305,6 +304,12 @@ def _other_units(channels: Sequence[Channel], source: Source) -> Iterator[Findin
         yield Finding(
             channel.target, seen, "read as the map says; correct unit, or set scale = 1 if right"
         )
+
+
+def _with_unit(name: str, source: Source) -> str:
+    """Return the name of a column, with the unit that the file has next to it."""
+    plain, unit = TWIN.sub("", name), source.units.get(name)
+    return f"{plain} [{unit}]" if unit else plain
 
 
 def _other_units_of_clocks(
@@ -322,9 +327,7 @@ def _other_units_of_clocks(
         if column is None or columns[column].dtype.kind in "mM" or unit == "iso8601":
             continue
         name = source.column_named(column)
-        plain = TWIN.sub("", name)
-        of_file = source.units.get(name)
-        in_name = clock_unit_in(f"{plain} [{of_file}]" if of_file else plain)
+        in_name = clock_unit_in(_with_unit(name, source))
         factor = UNITS[ALIASES.get(unit, unit)].factor
         if in_name is None or isclose(in_name.count_s or 0.0, factor):
             continue
