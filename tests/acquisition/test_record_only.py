@@ -590,6 +590,25 @@ def test_a_sign_that_is_misread_is_named(tmp_path, kind, negative, expected):
     assert all(expected in one and "torque: leaps by" in one for one in texts)
 
 
+@pytest.fixture
+def record_and_check(tmp_path):
+    """Record and check a device; return the recording, and what both say of its values."""
+
+    def run(answer, was="", now="", seconds=1.0, kind="exo_alone"):
+        server, _ = a_device(answer)
+        path, output = tmp_path / "bench.toml", tmp_path / "bench.parquet"
+        text = BENCH.format(port=server.getsockname()[1], watchdog_s=1.0)
+        assert was in text
+        path.write_text(text.replace(was, now) if was else text)
+        output.unlink(missing_ok=True)
+        settings = RunSettings(name="one", run=kind, purpose="train", duration_s=seconds)
+        with server:
+            record_only(path, settings, output, 100.0, ELBOW)
+            return output, misread_values(output, path), findings_of(path, server)
+
+    return run
+
+
 @pytest.mark.parametrize(
     ("keys", "middle", "expected"),
     [
@@ -600,23 +619,16 @@ def test_a_sign_that_is_misread_is_named(tmp_path, kind, negative, expected):
         ('type = "uint16", offset = -32768', 32768, ""),
     ],
 )
-def test_a_torque_that_counts_from_another_zero_is_named(tmp_path, keys, middle, expected):
+def test_a_torque_that_counts_from_another_zero_is_named(record_and_check, keys, middle, expected):
     """By the check and in the recording, which may be the first to see it change its sign."""
 
     def answer(n, words):
         torque = round(200.0 * np.sin(0.2 * words[0] + 0.1))
         return [words[0], 500, (torque + middle) & 0xFFFF]
 
-    path, output = tmp_path / "bench.toml", tmp_path / "bench.parquet"
-    server, _ = a_device(answer)
-    text = BENCH.format(port=server.getsockname()[1], watchdog_s=1.0)
-    path.write_text(
-        text.replace('address = 2, type = "int16", scale = 0.1', f"address = 2, {keys}")
-    )
-    settings = RunSettings(name="one", run="exo_alone", purpose="train", duration_s=1.0)
-    with server:
-        record_only(path, settings, output, 100.0, ELBOW)
-        texts = misread_values(output, path) + findings_of(path, server)
+    was = 'address = 2, type = "int16", scale = 0.1'
+    _, warnings, findings = record_and_check(answer, was, f"address = 2, {keys}")
+    texts = warnings + findings
     assert len(texts) == 2 * bool(expected)
     assert all(expected.format("map.drive.plc.read.torque") in text for text in texts)
 
@@ -643,18 +655,12 @@ def test_a_torque_of_magnitude_and_sign_bit_is_recorded_and_has_no_findings(tmp_
 
 
 @pytest.mark.parametrize("every", [1, 5], ids=["each sample", "each fifth sample"])
-def test_registers_that_are_renewed_slower_than_rows_come_are_named(tmp_path, every):
+def test_registers_that_are_renewed_slower_than_rows_come_are_named(record_and_check, every):
     def answer(n, words):
         at = words[0] // every * every / 100.0
         return [words[0], round(800.0 * np.sin(6.0 * at)) & 0xFFFF, 20]
 
-    server, _ = a_device(answer)
-    path, output = tmp_path / "bench.toml", tmp_path / "bench.parquet"
-    path.write_text(BENCH.format(port=server.getsockname()[1], watchdog_s=1.0))
-    settings = RunSettings(name="one", run="exo_alone", purpose="train", duration_s=1.2)
-    with server:
-        record_only(path, settings, output, 100.0, ELBOW)
-        (texts, findings) = misread_values(output, path), findings_of(path, server)
+    output, texts, findings = record_and_check(answer, seconds=1.2)
     assert len(texts) == len(findings) == (every > 1), "the torque rests"
     for text, start in zip(
         (*texts, *findings), (f"{output}: elbow_angle_rad", "angle"), strict=False
@@ -664,38 +670,26 @@ def test_registers_that_are_renewed_slower_than_rows_come_are_named(tmp_path, ev
 
 
 @pytest.mark.parametrize("largest", [20000.0, 50000.0], ids=["within", "beyond"])
-def test_a_torque_that_is_cut_off_at_the_end_of_its_register_is_named(tmp_path, largest):
+def test_a_torque_that_is_cut_off_at_the_end_of_its_register_is_named(record_and_check, largest):
     def answer(n, words):
         torque = round(largest * np.sin(0.1 * words[0]))
         return [words[0], 500, min(max(torque, -32768), 32767) & 0xFFFF]
 
-    server, _ = a_device(answer)
-    path, output = tmp_path / "bench.toml", tmp_path / "bench.parquet"
-    path.write_text(BENCH.format(port=server.getsockname()[1], watchdog_s=1.0))
-    settings = RunSettings(name="one", run="exo_alone", purpose="train", duration_s=1.0)
-    with server:
-        record_only(path, settings, output, 100.0, ELBOW)
-        (texts, findings) = misread_values(output, path), findings_of(path, server)
+    _, texts, findings = record_and_check(answer)
     assert len(texts) == len(findings) == (largest > 32768.0)
     for text, name in zip((*texts, *findings), ("elbow_torque_nm", "torque"), strict=False):
         assert re.search(rf"{name}: \d+ of \d+ values are at the end of their register", text)
 
 
 @pytest.mark.parametrize("most", [27648, 16000], ids=["beyond", "within"])
-def test_a_torque_that_is_cut_off_within_its_register_is_named(tmp_path, most):
+def test_a_torque_that_is_cut_off_within_its_register_is_named(record_and_check, most):
     """An analog input ends at 27648 counts, far from the end of its 16 bits."""
 
     def answer(n, words):
         torque = round(1.5 * most * np.sin(0.1 * words[0]))
         return [words[0], 500, min(max(torque, -27648), 27648) & 0xFFFF]
 
-    server, _ = a_device(answer)
-    path, output = tmp_path / "bench.toml", tmp_path / "bench.parquet"
-    path.write_text(BENCH.format(port=server.getsockname()[1], watchdog_s=1.0))
-    settings = RunSettings(name="one", run="exo_alone", purpose="train", duration_s=2.0)
-    with server:
-        record_only(path, settings, output, 100.0, ELBOW)
-        (texts, findings) = misread_values(output, path), findings_of(path, server)
+    _, texts, findings = record_and_check(answer, seconds=2.0)
     assert len(texts) == len(findings) == (most == 27648)
     assert all("at full slope and stay there" in text for text in (*texts, *findings))
 
@@ -739,7 +733,9 @@ NAMED = {
 
 
 @pytest.mark.parametrize("encoded", ENCODED)
-def test_an_encoding_is_recorded_as_the_file_says_and_named_where_it_does_not(tmp_path, encoded):
+def test_an_encoding_is_recorded_as_the_file_says_and_named_where_it_does_not(
+    record_and_check, encoded
+):
     right, wrong = (f'address = 2, {keys}, unit = "N·m"' for keys in ENCODED[encoded])
     device = Block({"torque": Register.model_validate(tomllib.loads(f"x = {{ {right} }}")["x"])})
     middle = 25000.0 if encoded == "mod10" else 0.0
@@ -749,16 +745,9 @@ def test_an_encoding_is_recorded_as_the_file_says_and_named_where_it_does_not(tm
         return [words[0], 500, *device.encode({"torque": torque}), 0, 0][:5]
 
     was = 'address = 2, type = "int16", scale = 0.1, unit = "N·m"'
-    assert was in BENCH
-    settings = RunSettings(name="one", run="exo_alone", purpose="train", duration_s=1.2)
     for keys in (right, wrong):
-        server, _ = a_device(answer)
-        path, output = tmp_path / "bench.toml", tmp_path / f"{keys == right}.parquet"
-        text = BENCH.format(port=server.getsockname()[1], watchdog_s=1.0)
-        path.write_text(text.replace(was, keys))
-        with server:
-            record_only(path, settings, output, 100.0, ELBOW)
-            texts = misread_values(output, path) + findings_of(path, server)
+        output, warnings, findings = record_and_check(answer, was, keys, seconds=1.2)
+        texts = warnings + findings
         if keys == wrong:
             assert len(texts) == 2
             assert all(f"set map.drive.plc.read.torque.{NAMED[encoded]}" in text for text in texts)

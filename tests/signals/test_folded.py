@@ -4,18 +4,10 @@ import numpy as np
 import pytest
 
 from pipelines.signals.folded import is_folded
+from tests.signals.torques import torque
 
 SEEDS = 100
 SECONDS = np.arange(300) / 100.0
-
-
-def torque(rng, noise=0.0, friction=0.0):
-    """Return a torque of about 10 N·m that crosses zero, in steps of 0.01 N·m."""
-    speed, *phases = rng.uniform([3.0, 0.0, 0.0, 0.0], [12.0, 6.0, 6.0, 6.0])
-    values = 10.0 * np.sin(speed * SECONDS + phases[0])
-    values += 3.0 * np.sin(2.3 * speed * SECONDS + phases[1])
-    values += friction * np.sign(np.cos(speed * SECONDS + phases[2]))
-    return np.round(values + rng.normal(0.0, noise, len(SECONDS)), 2)
 
 
 def touching(rng, noise):
@@ -33,7 +25,7 @@ def share(channel):
 @pytest.mark.parametrize("friction", [0.0, 2.0])
 @pytest.mark.parametrize("sign", [1.0, -1.0])
 def test_a_magnitude_is_named(noise, least, friction, sign):
-    assert share(lambda rng: sign * np.abs(torque(rng, noise, friction))) >= least
+    assert share(lambda rng: sign * np.abs(torque(rng, SECONDS, noise, friction))) >= least
 
 
 @pytest.mark.parametrize("noise", [0.0, 0.05])
@@ -47,7 +39,7 @@ def test_a_magnitude_is_named(noise, least, friction, sign):
 )
 def test_a_magnitude_with_the_sign_of_something_else_is_named(noise, sign):
     def channel(rng):
-        values = torque(rng)
+        values = torque(rng, SECONDS)
         noisy = np.round(values + rng.normal(0.0, noise, len(values)), 2)
         return np.where(sign(values) < 0.0, -1.0, 1.0) * np.abs(noisy)
 
@@ -57,15 +49,15 @@ def test_a_magnitude_with_the_sign_of_something_else_is_named(noise, sign):
 @pytest.mark.parametrize(
     "channel",
     [
-        lambda rng: torque(rng, 0.05),
-        lambda rng: torque(rng, 0.05, 2.0),
-        lambda rng: torque(rng, 0.5, 8.0),
-        lambda rng: torque(rng, 3.0),
-        lambda rng: np.round(torque(rng, 0.3)),
+        lambda rng: torque(rng, SECONDS, 0.05),
+        lambda rng: torque(rng, SECONDS, 0.05, 2.0),
+        lambda rng: torque(rng, SECONDS, 0.5, 8.0),
+        lambda rng: torque(rng, SECONDS, 3.0),
+        lambda rng: np.round(torque(rng, SECONDS, 0.3)),
         lambda rng: np.round(np.cumsum(rng.normal(0.0, 0.3, len(SECONDS))), 2),
-        lambda rng: 20.0 + torque(rng, 0.05),
-        lambda rng: np.maximum(torque(rng, 0.05), 0.0),
-        lambda rng: np.maximum(torque(rng, 0.5), 0.0),
+        lambda rng: 20.0 + torque(rng, SECONDS, 0.05),
+        lambda rng: np.maximum(torque(rng, SECONDS, 0.05), 0.0),
+        lambda rng: np.maximum(torque(rng, SECONDS, 0.5), 0.0),
         lambda rng: touching(rng, 0.0),
         lambda rng: touching(rng, 0.05),
         lambda rng: touching(rng, 0.5),

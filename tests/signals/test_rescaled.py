@@ -5,18 +5,10 @@ import pytest
 
 from pipelines.signals.held import new_values
 from pipelines.signals.rescaled import is_rescaled
+from tests.signals.torques import torque
 
 SEEDS = 200
 SECONDS = np.arange(600) / 100.0
-
-
-def torque(rng, noise=0.0, friction=0.0):
-    """Return a torque of about 10 N·m that crosses zero, in steps of 0.01 N·m."""
-    speed, *phases = rng.uniform([3.0, 0.0, 0.0, 0.0], [12.0, 6.0, 6.0, 6.0])
-    values = 10.0 * np.sin(speed * SECONDS + phases[0])
-    values += 3.0 * np.sin(2.3 * speed * SECONDS + phases[1])
-    values += friction * np.sign(np.cos(speed * SECONDS + phases[2]))
-    return np.round(values + rng.normal(0.0, noise, len(SECONDS)), 2)
 
 
 def share(channel):
@@ -29,7 +21,7 @@ def share(channel):
 @pytest.mark.parametrize("factor", [0.1, 10.0])
 def test_a_decimal_point_that_moves_is_named(noise, friction, factor):
     def channel(rng):
-        values = torque(rng, noise, friction)
+        values = torque(rng, SECONDS, noise, friction)
         return np.where(np.abs(values) < 4.0, factor * values, values)
 
     assert share(channel) >= 0.8
@@ -38,13 +30,13 @@ def test_a_decimal_point_that_moves_is_named(noise, friction, factor):
 @pytest.mark.parametrize(
     "channel",
     [
-        lambda rng: torque(rng),
-        lambda rng: torque(rng, 0.05, 2.0),
-        lambda rng: torque(rng, 0.5, 8.0),
-        lambda rng: torque(rng, 5.0),
-        lambda rng: np.abs(torque(rng, 0.05, 2.0)),
-        lambda rng: np.round(torque(rng, 0.3)),
-        lambda rng: np.where(rng.random(len(SECONDS)) < 0.02, 0.0, torque(rng)),
+        lambda rng: torque(rng, SECONDS),
+        lambda rng: torque(rng, SECONDS, 0.05, 2.0),
+        lambda rng: torque(rng, SECONDS, 0.5, 8.0),
+        lambda rng: torque(rng, SECONDS, 5.0),
+        lambda rng: np.abs(torque(rng, SECONDS, 0.05, 2.0)),
+        lambda rng: np.round(torque(rng, SECONDS, 0.3)),
+        lambda rng: np.where(rng.random(len(SECONDS)) < 0.02, 0.0, torque(rng, SECONDS)),
         lambda rng: np.round(np.cumsum(rng.normal(0.0, 0.3, len(SECONDS))), 2),
         lambda rng: 1.0 + 9.0 * (np.sin(rng.uniform(10.0, 60.0) * SECONDS) > 0.5 * SECONDS),
         lambda rng: np.zeros(0),
