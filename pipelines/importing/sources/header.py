@@ -30,8 +30,6 @@ class Header:
     """Place of the clock of each column, where the names show several clocks."""
     remark: str = ""
     """How the names follow from lines that do not fit the rows."""
-    scaling: dict[int, str] = field(default_factory=dict)
-    """Factors and offsets that a line gives to columns, by their places."""
 
 
 def is_scaling(line: Line) -> bool:
