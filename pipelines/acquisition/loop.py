@@ -5,8 +5,8 @@ import time
 from collections.abc import Coroutine, Sequence
 from typing import Any
 
+from pipelines.acquisition.drive_hold import DriveHold
 from pipelines.acquisition.exchange import Exchange
-from pipelines.acquisition.holding import Holding
 from pipelines.acquisition.machine.machine import Machine
 from pipelines.acquisition.machine.row import Row
 from pipelines.acquisition.machine.sampling import Sampling
@@ -39,7 +39,7 @@ class Loop:
         """Follow a plan; ``stopped_by`` names the signals that have come."""
         self._machine, self._supervisor, self._sampling = machine, supervisor, sampling
         self._exchange = Exchange(machine, supervisor, stopped_by)
-        self._holding = Holding(self._exchange, supervisor)
+        self._hold = DriveHold(self._exchange, supervisor)
         samples = (plan.stop - plan.first) * machine.samples_per_cycle
         rate_hz = supervisor.rate * machine.samples_per_cycle
         self._writer = SampleWriter(journal, machine, samples, rate_hz)
@@ -55,9 +55,7 @@ class Loop:
         # Whatever it is: the drives come first, it is reported after them.
         except BaseException as error:
             self._supervisor.abort(error)
-        stopping = Stopping(
-            self._exchange, self._supervisor, self._holding.tasks, self._report_last
-        )
+        stopping = Stopping(self._exchange, self._supervisor, self._hold.tasks, self._report_last)
         await stopping.run()
 
     def metadata(self) -> dict[str, Any]:
@@ -90,14 +88,14 @@ class Loop:
         follow = asyncio.ensure_future(following)
         # In lockstep no time passes while a drive is awaited.
         if self._machine.rig.clock == "real_time":
-            self._holding.start()
+            self._hold.start()
         ended = set[asyncio.Future]()
         try:
             ended, _ = await asyncio.wait(
-                [follow, *self._holding.tasks], return_when=asyncio.FIRST_COMPLETED
+                [follow, *self._hold.tasks], return_when=asyncio.FIRST_COMPLETED
             )
         finally:
-            self._holding.end()
+            self._hold.end()
             follow.cancel()
             self._sampling.end()
             await outlive([follow], self._supervisor.abort)

@@ -1,9 +1,8 @@
 """A log with the columns that a map names: the runs of its clock, and its quantities."""
 
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from math import isclose
 from pathlib import Path
 from typing import TypeVar
 
@@ -11,40 +10,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipelines.errors import InputError, SettingsError
+from pipelines.importing.channel import Channel, channels_of, needed_columns
+from pipelines.importing.file_against_map import contradictions
 from pipelines.importing.finding import Finding, counted, noting, unnoted
-from pipelines.importing.naming.meaning import TWIN, meaning
-from pipelines.importing.naming.unit_in_name import clock_unit_in, unit_in
 from pipelines.importing.quantities.conversion import columns_of, quantity
 from pipelines.importing.quantities.labels import labels_in
 from pipelines.importing.quantities.numbers import TAKEN_FOR_MISSING, numbers, same_stamps
 from pipelines.importing.sources.source import Columns, Source
 from pipelines.importing.time import clock
 from pipelines.importing.time.clock import Run
-from pipelines.settings import transmission
 from pipelines.settings.import_map import ImportMap, ReadingSettings, TimeSettings
-from pipelines.settings.units import ALIASES, UNITS
 from pipelines.signals.sampling import between_samples, sample_rate
 from pipelines.validation.suggestion import suggestion
 
 Reading = TypeVar("Reading", bound=ReadingSettings)
-
-
-@dataclass(frozen=True)
-class Channel:
-    """One column of the recording, and the reading that it comes from."""
-
-    target: str
-    where: str
-    """Its place in the map."""
-    reading: ReadingSettings
-    gain: float
-    required: bool
-    enabled: str | None = None
-    """Column that is 0 where the reading is not valid."""
-    time: str | None = None
-    """Column of its clock, if that is not the clock of the log."""
-    turns: bool = False
-    """Whether it is the angle of a joint that turns without end."""
 
 
 @dataclass(frozen=True)
@@ -220,8 +199,44 @@ def read_log(source: Source, settings: ImportMap, map_path: Path) -> Log:
     SettingsError
         If the map names columns that the log does not have, or has twice.
     """
-    channels = tuple(_channels(settings, source))
-    needed = _needed(channels, settings.time)
+    channels, time = tuple(channels_of(settings, source)), settings.time
+    needed = needed_columns(channels, time)
+    _refuse_absent(needed, source, map_path)
+    others = [name for name in labels_in(source.names) if name not in needed]
+    columns, labels = _loaded(needed, source, others)
+    findings = [Finding("rows", remark, "") for remark in source.remarks]
+    note = noting("time", findings)
+    if time.column is None:
+        # The longest, as constants have one row.
+        rows, rate_hz = max(map(len, columns.values())), float(time.rate_hz or 0.0)
+        note("no clock in the log", f"rows taken for uniform at {rate_hz:g} Hz, by the map")
+        run = Run(np.arange(rows), np.arange(rows) / rate_hz, 0.0)
+        columns = _as_numbers(columns, set(), findings)
+        findings += contradictions(channels, columns, time, source)
+        return Log(source, time, channels, columns, labels, 0.0, rows, (run,), findings)
+    column = time.column
+    clocks = {channel.time for channel in channels} | {column, time.plus}
+    # A clock that is the same as that of the log is none of the channel's own.
+    same = {
+        one.time for one in channels if one.time and same_stamps(columns[one.time], columns[column])
+    }
+    # The map may name the clock of the log, to interpolate a channel of which rows are blank.
+    channels = tuple(
+        replace(one, time=None) if one.reading.time is None and one.time in same else one
+        for one in channels
+    )
+    _check_switches(channels, source, {column, *same})
+    columns = _as_numbers(columns, clocks, findings)
+    findings += contradictions(channels, columns, time, source)
+    plus = None if time.plus is None else columns[time.plus]
+    stamps = clock.stamps(columns[column], column, time, note, plus)
+    origin = clock.first_stamp(stamps)
+    runs = tuple(clock.runs(clock.seconds(stamps, origin, time, note), stamps, time.count_s, note))
+    return Log(source, time, channels, columns, labels, origin, len(stamps), runs, findings)
+
+
+def _refuse_absent(needed: Mapping[str, str], source: Source, map_path: Path) -> None:
+    """Refuse a map that names a column which the log does not have, or has twice."""
     for name, where in needed.items():
         # Asked first: a name that occurs twice is absent, because both columns have numbers.
         if f"{name}#1" in source.names:
@@ -235,163 +250,6 @@ def read_log(source: Source, settings: ImportMap, map_path: Path) -> Log:
             raise SettingsError(
                 f"has no column {name!r}, which {where} in {map_path} names; {reason}"
             )
-    others = [name for name in labels_in(source.names) if name not in needed]
-    columns, labels = _loaded(needed, source, others)
-    findings = [Finding("rows", remark, "") for remark in source.remarks]
-    findings += _scaling(channels, source)
-    findings += _other_units(channels, source)
-    findings += _units_above(channels, source)
-    findings += _other_units_of_clocks(channels, columns, settings.time, source)
-    note = noting("time", findings)
-    if settings.time.column is None:
-        # The longest, as constants have one row.
-        rows, rate_hz = max(map(len, columns.values())), float(settings.time.rate_hz or 0.0)
-        note("no clock in the log", f"rows taken for uniform at {rate_hz:g} Hz, by the map")
-        run = Run(np.arange(rows), np.arange(rows) / rate_hz, 0.0)
-        columns = _as_numbers(columns, set(), findings)
-        return Log(source, settings.time, channels, columns, labels, 0.0, rows, (run,), findings)
-    column = settings.time.column
-    clocks = {channel.time for channel in channels} | {column, settings.time.plus}
-    # A clock that is the same as that of the log is none of the channel's own.
-    same = {
-        one.time for one in channels if one.time and same_stamps(columns[one.time], columns[column])
-    }
-    # The map may name the clock of the log, to interpolate a channel of which rows are blank.
-    channels = tuple(
-        replace(one, time=None) if one.reading.time is None and one.time in same else one
-        for one in channels
-    )
-    _check_switches(channels, source, {column, *same})
-    columns = _as_numbers(columns, clocks, findings)
-    findings += _clocks_in_the_same_rows(channels, columns, settings.time, source)
-    plus = None if settings.time.plus is None else columns[settings.time.plus]
-    stamps = clock.stamps(columns[column], column, settings.time, note, plus)
-    origin = clock.first_stamp(stamps)
-    time_s = clock.seconds(stamps, origin, settings.time, note)
-    runs = tuple(clock.runs(time_s, stamps, settings.time.count_s, note))
-    return Log(
-        source, settings.time, channels, columns, labels, origin, len(stamps), runs, findings
-    )
-
-
-def _scaling(channels: Sequence[Channel], source: Source) -> Iterator[Finding]:
-    """Report factors and offsets in the file of which the map knows nothing."""
-    for channel in channels:
-        if channel.reading.model_fields_set & {"scale", "expression"}:
-            continue
-        for name in columns_of(channel.reading, channel.where):
-            text = source.scaling.get(source.column_named(name))
-            if text is not None:
-                action = "taken to be in the values; if not, set scale and zero"
-                yield Finding(channel.target, f"the file says {text} of {name!r}", action)
-
-
-def _other_units(channels: Sequence[Channel], source: Source) -> Iterator[Finding]:
-    """Report units in the file, next to a column or in its name, that are not those of the map."""
-    for channel in channels:
-        reading = channel.reading
-        # A scale says that the map's author knows better; without it names and units agree.
-        if reading.column is None or "scale" in reading.model_fields_set:
-            continue
-        name = source.column_named(reading.column)
-        in_name = unit_in(_with_unit(name, source))
-        if in_name is None or not in_name.decides or in_name.doubt:
-            continue
-        known = UNITS.get(in_name.unit or "")
-        if not in_name.unread and (known is None or known == reading.known_unit):
-            continue
-        seen = f"the file says {in_name.unread or in_name.unit} of {name!r}, the map {reading.unit}"
-        yield Finding(
-            channel.target, seen, "read as the map says; correct unit, or set scale = 1 if right"
-        )
-
-
-def _with_unit(name: str, source: Source) -> str:
-    """Return the name of a column, with the unit that the file has next to it."""
-    plain, unit = TWIN.sub("", name), source.units.get(name)
-    return f"{plain} [{unit}]" if unit else plain
-
-
-def _other_units_of_clocks(
-    channels: Sequence[Channel], columns: Columns, time: TimeSettings, source: Source
-) -> Iterator[Finding]:
-    """Report units of clocks in the file that are not those of the map."""
-    stated = "scale" in time.model_fields_set
-    clocks = {} if stated else {time.column: time.unit, time.plus: time.plus_unit}
-    for channel in channels:
-        reading = channel.reading
-        if reading.time_scale is None and not (reading.time_unit is None and stated):
-            clocks.setdefault(channel.time, reading.time_unit or time.unit)
-    for column, unit in clocks.items():
-        # Dates are in no unit, and typed durations know theirs.
-        if column is None or columns[column].dtype.kind in "mM" or unit == "iso8601":
-            continue
-        name = source.column_named(column)
-        in_name = clock_unit_in(_with_unit(name, source))
-        factor = UNITS[ALIASES.get(unit, unit)].factor
-        if in_name is None or isclose(in_name.count_s or 0.0, factor):
-            continue
-        seen = f"the file says {in_name.text} of {name!r}, the map {unit}"
-        yield Finding("time", seen, "read as the map says; correct unit, or set scale if right")
-
-
-def _units_above(channels: Sequence[Channel], source: Source) -> Iterator[Finding]:
-    """Report units of a quantity in lines that do not name the columns, if the map has others."""
-    above = [one for one in map(unit_in, source.fields_above) if one and one.unit and one.decides]
-    for channel in channels:
-        reading = channel.reading
-        if "scale" in reading.model_fields_set:
-            continue
-        alike = {
-            str(one.unit): UNITS[str(one.unit)]
-            for one in above
-            if UNITS[str(one.unit)].dimension == reading.known_unit.dimension
-        }
-        if alike and reading.known_unit not in alike.values():
-            seen = f"the lines above the rows say {' and '.join(alike)}, the map {reading.unit}"
-            action = "read as the map says; correct unit, or set scale = 1 if right"
-            yield Finding(channel.target, seen, action)
-
-
-def _clocks_in_the_same_rows(
-    channels: Sequence[Channel], columns: Columns, time: TimeSettings, source: Source
-) -> Iterator[Finding]:
-    """Report channels that end, or are blank, where another clock in the file is.
-
-    A logger of several rates writes a block of columns for each, and a row of one block is at
-    another time than the same row of another.
-    """
-    stamps = columns[str(time.column)]
-    partial = {
-        one: known
-        for one in channels
-        if one.time is None and one.reading.column
-        for known in [np.isfinite(columns[one.reading.column])]
-        if len(known) == len(stamps) and known.any() and not known.all()
-    }
-    others = [
-        name
-        for name in source.names
-        if partial and name not in columns and meaning(name).quantity == "time"
-    ]
-    if not others or stamps.dtype.kind not in "iuf":
-        return
-    for name, values in _as_numbers(source.load(others), set(), []).items():
-        for channel, known in partial.items():
-            if not np.array_equal(np.isfinite(values), known):
-                continue
-            unit = UNITS.get(meaning(name).unit or "")
-            passed = np.diff(values[known]) * (unit.factor if unit else time.count_s)
-            of_log = np.diff(stamps[known]) * time.count_s
-            # The same instants in another unit are no other clock.
-            if (passed <= 0.0).any() or np.allclose(passed.sum(), of_log.sum(), rtol=0.01):
-                continue
-            seen = f"has values in just the rows of another clock, {name!r}"
-            action = (
-                f"read at the times of {time.column!r}; if the other is its clock, set"
-                f" {channel.where}.time to it"
-            )
-            yield Finding(channel.target, seen, action)
 
 
 def _loaded(
@@ -422,55 +280,6 @@ def _similar(name: str, names: Sequence[str]) -> str:
     return suggestion(name, siblings or list(names))
 
 
-def _channels(settings: ImportMap, source: Source) -> Iterator[Channel]:
-    for i, joint in enumerate(settings.joint):
-        for name, reading in joint.readings():
-            gain = reading.gain(transmission.dimension_at(joint.kind, name))
-            time = _clock(reading, f"joint[{i}].{name}", settings, source)
-            yield Channel(
-                joint.joint.column(name),
-                f"joint[{i}].{name}",
-                _with_clock(reading, time, settings),
-                gain,
-                # The equation of motion needs both; other channels may be blank in some rows.
-                required=name in ("angle", "torque"),
-                # While a drive is off only its torque is no measurement; the encoder still is one.
-                enabled=joint.enabled if name == "torque" else None,
-                time=time,
-                turns=joint.turns and name in ("angle", "reference"),
-            )
-    for i, force in enumerate(settings.force):
-        where = f"force[{i}]"
-        clock_of = _clock(force, where, settings, source)
-        force = _with_clock(force, clock_of, settings)
-        yield Channel(force.target, where, force, 1.0, required=False, time=clock_of)
-
-
-def _with_clock(reading: Reading, time: str | None, settings: ImportMap) -> Reading:
-    """Return a reading with the unit and offset of its clock.
-
-    The map may have them at another channel of that clock.
-    """
-    keys = ("time_unit", "time_scale", "time_offset_s")
-    of_clock = (one for _, one in settings.readings() if one.time is not None and one.time == time)
-    other = next((one for one in of_clock if one.model_fields_set & set(keys)), None)
-    if other is None or reading.model_fields_set & set(keys):
-        return reading
-    return reading.model_copy(update={key: getattr(other, key) for key in keys})
-
-
-def _clock(reading: ReadingSettings, where: str, settings: ImportMap, source: Source) -> str | None:
-    """Return the clock of a reading: of the map, or else of the file, if it is not the log's."""
-    if reading.time is not None or settings.time.column is None:
-        return reading.time
-    columns = (source.column_named(name) for name in columns_of(reading, where))
-    own = {source.clocks.get(name) for name in columns} - {None}
-    if len(own) > 1:
-        names = ", ".join(sorted(map(str, own)))
-        raise SettingsError(f"{where}.expression: mixes columns of the clocks {names}; use one")
-    return next(iter(own - {settings.time.column}), None)
-
-
 def _check_switches(channels: Sequence[Channel], source: Source, same: set[str]) -> None:
     """Refuse a switch that was sampled by another clock: its rows are not those of the log."""
     for channel in channels:
@@ -480,21 +289,6 @@ def _check_switches(channels: Sequence[Channel], source: Source, same: set[str])
                 f"{channel.enabled!r} has a clock of its own, {of_switch!r}; joint.enabled needs"
                 " a column with the clock of the log"
             )
-
-
-def _needed(channels: tuple[Channel, ...], time: TimeSettings) -> dict[str, str]:
-    """Return every column that the map names, and its first place there."""
-    needed = {time.column: "time.column"} if time.column is not None else {}
-    if time.plus is not None:
-        needed.setdefault(time.plus, "time.plus")
-    for channel in channels:
-        for name in columns_of(channel.reading, channel.where):
-            needed.setdefault(name, channel.where)
-        if channel.time is not None:
-            needed.setdefault(channel.time, f"{channel.where}.time")
-        if channel.enabled is not None:
-            needed.setdefault(channel.enabled, f"{channel.where.rpartition('.')[0]}.enabled")
-    return needed
 
 
 def _as_numbers(columns: Columns, clocks: set[str | None], findings: list[Finding]) -> Columns:

@@ -5,7 +5,7 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-SPAN = 20
+STEP = 20
 """Samples over which a velocity is taken: long against noise, short against a motion."""
 GIVES_BACK = 0.2
 """Share of the mean magnitude of power that drives may absorb on average."""
@@ -40,11 +40,11 @@ def mean_power(time_s: NDArray, angle: NDArray, torque: NDArray) -> tuple[float,
     torque : (n,) array
         Torque, N·m, or force, N.
     """
-    if len(time_s) < 5 * SPAN:
+    if len(time_s) < 5 * STEP:
         return 0.0, 0.0
-    velocity = (angle[SPAN:] - angle[:-SPAN]) / (time_s[SPAN:] - time_s[:-SPAN])
+    velocity = (angle[STEP:] - angle[:-STEP]) / (time_s[STEP:] - time_s[:-STEP])
     # The mean torque over the span of the velocity: a shift in time between both would change their
     # product.
-    averaged = np.convolve(torque, np.ones(SPAN + 1) / (SPAN + 1), "valid")
+    averaged = np.convolve(torque, np.ones(STEP + 1) / (STEP + 1), "valid")
     power = averaged * velocity
     return float(np.mean(power)), float(np.mean(np.abs(power)))

@@ -11,8 +11,8 @@ from unittest.mock import patch
 
 from pymodbus.client.base import ModbusBaseClient
 
+from pipelines.acquisition import drive_hold, loop, pacing, progress, stopping
 from pipelines.acquisition import exchange as exchanges
-from pipelines.acquisition import holding, loop, pacing, progress, stopping
 from pipelines.acquisition.acquire import record_run
 from pipelines.acquisition.loop import Loop
 from pipelines.acquisition.machine import drive, drive_protocol, force_sensor, machine
@@ -469,7 +469,7 @@ def _patched(simulated, time, run, plan, own):
             drive_protocol,
             exchanges,
             force_sensor,
-            holding,
+            drive_hold,
             loop,
             machine,
             pacing,

@@ -10,7 +10,7 @@ from pipelines.acquisition.safety.supervisor import Supervisor
 from pipelines.errors import Unanswered
 
 
-class Holding:
+class DriveHold:
     """One task a drive, for as long as the plan is followed."""
 
     def __init__(self, exchange: Exchange, supervisor: Supervisor) -> None:
