@@ -5,7 +5,14 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from pipelines.acquisition.encodings import decimal_keys, is_gray, is_half_of_float64, written_keys
+from pipelines.acquisition.encodings import (
+    decimal_keys,
+    is_float16,
+    is_gray,
+    is_half_of_float64,
+    is_low_byte,
+    written_keys,
+)
 from pipelines.acquisition.leaps import sign_leap
 from pipelines.settings.rig import Register
 from pipelines.signals.cut_off import cut_off_at
@@ -87,6 +94,17 @@ def _wrong_type(register: Register, where: str, new: NDArray) -> str | None:
         return (
             "values bend at each power of two, and go on evenly as the first half of a float64; set"
             f' {where}.type = "float64", and look at the other values of this device'
+        )
+    if is_float16(register, new):
+        return (
+            "values bend at each power of two, and go on evenly as floats of 16 bits; let the"
+            " device write an integer or a float32, as no key reads a float16"
+        )
+    if is_low_byte(register, new):
+        return (
+            "values leap by 256 counts, and go on evenly if the low byte is a number with a sign of"
+            " its own, and the high byte something else; let the device write each to a register,"
+            " as no key reads a byte"
         )
     return None
 
