@@ -40,7 +40,7 @@ def misread(quantity: str, register: Register, where: str, values: NDArray) -> I
     # An angle may leap because it starts again after a turn.
     may_start_again = quantity in ("angle", "reference") and register.encoding == "binary"
     of_bits = _wrong_type(register, where, new) or (
-        None if may_start_again else sign_leap(register, where, values)
+        None if may_start_again else _other_sign(register, where, values)
     )
     # Nothing else is to be seen in values of which the bits are misread.
     if of_bits is not None:
@@ -100,13 +100,18 @@ def _wrong_type(register: Register, where: str, new: NDArray) -> str | None:
             "values bend at each power of two, and go on evenly as floats of 16 bits; let the"
             " device write an integer or a float32, as no key reads a float16"
         )
-    if is_low_byte(register, new):
+    return None
+
+
+def _other_sign(register: Register, where: str, values: NDArray) -> str | None:
+    """Return how values (n,) leap where they change their sign."""
+    if is_low_byte(register, values[new_values(values)]):
         return (
             "values leap by 256 counts, and go on evenly if the low byte is a number with a sign of"
             " its own, and the high byte something else; let the device write each to a register,"
             " as no key reads a byte"
         )
-    return None
+    return sign_leap(register, where, values)
 
 
 def _is_about_middle(register: Register, values: NDArray) -> bool:

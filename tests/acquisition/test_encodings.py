@@ -227,6 +227,12 @@ def test_two_bytes_of_two_quantities_in_a_register_are_named(warms_up, used):
     assert np.mean(named) > 0.7
 
 
+def test_an_angle_of_8_bits_that_starts_again_is_not_taken_for_two_bytes():
+    register = Register(address=0, type="uint16")
+    angle = np.round(50 * SWING) % 256
+    assert not any("byte" in text for text in misread("angle", register, "x", angle))
+
+
 @pytest.mark.parametrize("friction", [0.0, 1.0, 10.0])
 @pytest.mark.parametrize("noise", [0.0, 0.05, 1.0])
 @pytest.mark.parametrize("per_count", [0.5, 0.05, 0.01, 0.003])
