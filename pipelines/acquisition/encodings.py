@@ -99,25 +99,77 @@ def is_half_of_float64(register: Register, values: NDArray) -> bool:
     values : (n,) array
         New values in a row, as it reads them, SI units.
     """
+    if register.type != "float32":
+        return False
+    factor, offset = register.si
+    single = ((values[np.isfinite(values)] - offset) / factor).astype(np.float32)
+    bits = single.view(np.uint32).astype(np.uint64) << np.uint64(32)
+    return _goes_on_as(bits.view(np.float64), bits >> np.uint64(52), single)
+
+
+def is_float16(register: Register, values: NDArray) -> bool:
+    """Return whether values go on evenly only as a float of 16 bits.
+
+    Read as an integer, with or without a sign bit, it is about the logarithm of its value, and
+    bends as the first half of a float64 does.
+
+    Parameters
+    ----------
+    register : Register
+        As in the rig file.
+    values : (n,) array
+        New values in a row, as it reads them, SI units.
+    """
+    if not _is_judged(register) or register.bits != 16 or register.direction is not None:
+        return False
+    bits = np.array(_raw(register, values), dtype=np.uint16)
+    # Without the leap of a sign bit that is read as a part of a number.
+    size = (bits & np.uint16(0x7FFF)).astype(float)
+    integer = np.where(bits >> np.uint16(15), -size, size)
+    return _goes_on_as(bits.view(np.float16), bits >> np.uint16(10), integer)
+
+
+def _goes_on_as(floats: NDArray, exponents: NDArray, read: NDArray) -> bool:
+    """Return whether floats (n,) go on where their exponents change, and what was read bends."""
     # Powers of two that are passed, and how far off a straight line a value is there, in medians of
     # all, if it bends and if it does not.
     enough, bends, goes_on = 6, 2.5, 1.5
-    known = values[np.isfinite(values)]
-    if register.type != "float32" or len(known) < 3:
+    passed = np.flatnonzero(np.diff(exponents.astype(np.int64)))
+    passed = passed[(passed > 0) & (passed < len(read) - 2)]
+    if len(passed) < enough or not np.isfinite(floats).all():
         return False
-    factor, offset = register.si
-    single = ((known - offset) / factor).astype(np.float32)
-    bits = single.view(np.uint32).astype(np.uint64) << np.uint64(32)
-    double = bits.view(np.float64)
-    passed = np.flatnonzero(np.diff(bits >> np.uint64(52)))
-    passed = passed[(passed > 0) & (passed < len(known) - 2)]
-    if len(passed) < enough or not np.isfinite(double).all():
-        return False
-    off_line = [np.abs(np.diff(x.astype(float), 2)) for x in (single, double)]
+    off_line = [np.abs(np.diff(x.astype(float), 2)) for x in (read, floats)]
     # Between two samples the bend may be nearer to either.
     there = [float(np.median(np.maximum(off[passed - 1], off[passed]))) for off in off_line]
     usual = [float(np.median(np.maximum(off[:-1], off[1:]))) for off in off_line]
     return there[0] > bends * usual[0] and there[1] <= goes_on * usual[1]
+
+
+def is_low_byte(register: Register, values: NDArray) -> bool:
+    """Return whether values go on evenly only if the low byte is a number with a sign of its own.
+
+    Two bytes of two quantities may share a register. Read as one number, they leap by 256 counts
+    where the low byte changes its sign, and the high byte does not follow. In one number it does.
+
+    Parameters
+    ----------
+    register : Register
+        As in the rig file.
+    values : (n,) array
+        New values in a row, as it reads them, SI units.
+    """
+    # Steps that are no coincidence, and the share of the way that they leave.
+    enough, least = 30, 0.5
+    if not _is_judged(register) or register.bits != 16 or len(values) <= enough:
+        return False
+    raw = np.array(_raw(register, values), dtype=np.uint16)
+    low, high = (raw & np.uint16(0xFF)).astype(np.uint8).view(np.int8), raw >> np.uint16(8)
+    way = np.abs(np.diff(raw.astype(float))).sum()
+    # Zero is passed by a number, too, from the lowest to the highest.
+    turned = np.abs(np.diff(raw.view(np.int16).astype(float))).sum()
+    apart = np.abs(np.diff(low.astype(float))).sum()
+    apart += 256.0 * np.abs(np.diff(high.astype(float))).sum()
+    return bool(apart < least * min(way, turned))
 
 
 def _is_judged(register: Register) -> bool:

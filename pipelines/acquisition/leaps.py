@@ -89,6 +89,7 @@ def sign_leap(register: Register, where: str, values: NDArray) -> str | None:
         remedy = (
             f'it is a magnitude with a sign bit; set {where}.type = "uint{bits}" and sign_bit ='
             f" {bits - 1}"
+            + (". Or it is a float of 16 bits, which no key reads" if bits == 16 else "")
         )
     else:
         return None

@@ -5,7 +5,14 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from pipelines.acquisition.encodings import decimal_keys, is_gray, is_half_of_float64, written_keys
+from pipelines.acquisition.encodings import (
+    decimal_keys,
+    is_float16,
+    is_gray,
+    is_half_of_float64,
+    is_low_byte,
+    written_keys,
+)
 from pipelines.acquisition.leaps import sign_leap
 from pipelines.settings.rig import Register
 from pipelines.signals.cut_off import cut_off_at
@@ -33,7 +40,7 @@ def misread(quantity: str, register: Register, where: str, values: NDArray) -> I
     # An angle may leap because it starts again after a turn.
     may_start_again = quantity in ("angle", "reference") and register.encoding == "binary"
     of_bits = _wrong_type(register, where, new) or (
-        None if may_start_again else sign_leap(register, where, values)
+        None if may_start_again else _other_sign(register, where, values)
     )
     # Nothing else is to be seen in values of which the bits are misread.
     if of_bits is not None:
@@ -88,7 +95,23 @@ def _wrong_type(register: Register, where: str, new: NDArray) -> str | None:
             "values bend at each power of two, and go on evenly as the first half of a float64; set"
             f' {where}.type = "float64", and look at the other values of this device'
         )
+    if is_float16(register, new):
+        return (
+            "values bend at each power of two, and go on evenly as floats of 16 bits; let the"
+            " device write an integer or a float32, as no key reads a float16"
+        )
     return None
+
+
+def _other_sign(register: Register, where: str, values: NDArray) -> str | None:
+    """Return how values (n,) leap where they change their sign."""
+    if is_low_byte(register, values[new_values(values)]):
+        return (
+            "values leap by 256 counts, and go on evenly if the low byte is a number with a sign of"
+            " its own, and the high byte something else; let the device write each to a register,"
+            " as no key reads a byte"
+        )
+    return sign_leap(register, where, values)
 
 
 def _is_about_middle(register: Register, values: NDArray) -> bool:

@@ -3,7 +3,14 @@
 import numpy as np
 import pytest
 
-from pipelines.acquisition.encodings import CHANCE, decimal_keys, is_gray, is_half_of_float64
+from pipelines.acquisition.encodings import (
+    CHANCE,
+    decimal_keys,
+    is_float16,
+    is_gray,
+    is_half_of_float64,
+    is_low_byte,
+)
 from pipelines.acquisition.misread import misread
 from pipelines.modbus.register_block import Block
 from pipelines.settings.rig import Register
@@ -181,3 +188,58 @@ def test_a_float32_is_not_taken_for_half_of_a_float64(friction, noise, gravity):
     register = Register(address=0, type="float32")
     channels = torques(friction, noise * max(friction, 0.1), gravity)
     assert not any(is_half_of_float64(register, torque) for torque in channels)
+
+
+SIGNED_WORD = Register(address=0, type="int16")
+
+
+@pytest.mark.parametrize("used", [SIGNED, WORD, WORD | SIGN])
+def test_a_float_of_16_bits_is_named(used):
+    register = Register(address=0, **used)
+    block, named = Block({"x": register}), []
+    for torque in torques(noise=0.05):
+        words = torque.astype(np.float16).view(np.uint16)
+        values = np.array([block.decode([int(word)])["x"] for word in words])
+        named.append(
+            any(
+                "no key reads a float16" in text
+                for text in misread("torque", register, "x", values)
+            )
+        )
+    assert np.mean(named) > 0.7
+
+
+@pytest.mark.parametrize("used", [SIGNED, WORD])
+@pytest.mark.parametrize("warms_up", [0.0, 0.005])
+def test_two_bytes_of_two_quantities_in_a_register_are_named(warms_up, used):
+    """As a temperature and a torque of 8 bits share one."""
+    register = Register(address=0, **used)
+    block, named = Block({"x": register}), []
+    for torque in torques(friction=1.0, noise=0.05):
+        low = np.round(8 * torque).astype(np.int8).view(np.uint8).astype(int)
+        high = (31 + warms_up * np.arange(len(low))).astype(int)
+        values = np.array(
+            [block.decode([256 * h + b])["x"] for h, b in zip(high, low, strict=True)]
+        )
+        texts = misread("torque", register, "x", values)
+        named.append(any("no key reads a byte" in text for text in texts))
+    # Where zero is hardly passed, a high byte that changes weighs as much.
+    assert np.mean(named) > 0.7
+
+
+def test_an_angle_of_8_bits_that_starts_again_is_not_taken_for_two_bytes():
+    register = Register(address=0, type="uint16")
+    angle = np.round(50 * SWING) % 256
+    assert not any("byte" in text for text in misread("angle", register, "x", angle))
+
+
+@pytest.mark.parametrize("friction", [0.0, 1.0, 10.0])
+@pytest.mark.parametrize("noise", [0.0, 0.05, 1.0])
+@pytest.mark.parametrize("per_count", [0.5, 0.05, 0.01, 0.003])
+def test_an_integer_is_not_taken_for_a_float_or_for_two_bytes(friction, noise, per_count):
+    for level, gravity in ((0.0, 10.0), (0.0, 0.5), (64.0, 10.0), (3.7, 1.0)):
+        for torque in torques(friction, noise, gravity):
+            counts = np.clip(np.round((torque + level) / per_count), -32768, 32767)
+            new = counts[np.flatnonzero(np.diff(counts, prepend=np.nan))]
+            assert not is_float16(SIGNED_WORD, new)
+            assert not is_low_byte(SIGNED_WORD, new)

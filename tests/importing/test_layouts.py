@@ -519,3 +519,47 @@ purpose = "train"
     assert outcome.code == 0, outcome.err
     assert ("say lbf·ft, the map N·m" in outcome.printed) == is_named
     assert outcome.printed.count("the lines above") == is_named
+
+
+@pytest.mark.parametrize(
+    ("scope", "keys", "is_named"),
+    [
+        ("above", "", True),
+        ("above", ", scale = 1.0", False),
+        ("beside", "", True),
+        ("beside", ", scale = 1.0", False),
+    ],
+)
+def test_volts_of_an_oscilloscope_are_compared(imported, pendulum, tmp_path, scope, keys, is_named):
+    """One writes its settings above the rows, another to the left of the first of them."""
+    rows = list(zip(pendulum.time, pendulum.angle, pendulum.torque, strict=True))
+    lines = [",".join(f"{value:.6f}" for value in row) for row in rows]
+    if scope == "above":
+        above = ("Model,MSO44", "Horizontal Units,s", "Vertical Units,V,V", "Label,a,b")
+        lines = [*above, "TIME,CH1,CH2", *lines]
+        names = ("TIME", "CH1", "CH2")
+    else:
+        beside = ["Record Length,2500,", "Vertical Units,V,", "Vertical Scale,2.0,V"]
+        beside += ["Horizontal Units,s,", "Pt Fmt,Y,"]
+        left = [*beside, *[",,"] * (len(lines) - len(beside))]
+        lines = [f"{a},{b}" for a, b in zip(left, lines, strict=True)]
+        names = ("c4", "c5", "c6")
+    path = tmp_path / "scope.csv"
+    path.write_text("\n".join(lines) + "\n")
+    outcome = imported(
+        path,
+        map_text=f"""
+[time]
+column = "{names[0]}"
+unit = "s"
+[[joint]]
+name = "pivot"
+angle = {{ column = "{names[1]}", unit = "rad"{keys} }}
+torque = {{ column = "{names[2]}", unit = "N·m"{keys} }}
+[[recording]]
+name = "whole"
+purpose = "train"
+""",
+    )
+    assert outcome.code == 0, outcome.err
+    assert outcome.printed.count("the file says V of") == 2 * is_named

@@ -734,6 +734,23 @@ def test_a_unit_in_the_name_of_a_clock_that_is_not_that_of_the_map_is_named(
     assert expected in outcome.printed
 
 
+@pytest.mark.parametrize("places", [2, 4])
+def test_minutes_that_are_read_as_decimals_of_a_degree_are_named(
+    imported, pendulum, write_csv, places
+):
+    """As a theodolite or a rotary table writes 12° 59' 30": 12.5930."""
+    text = MAP.replace('column = "angle", unit = "rad"', 'column = "angle", unit = "deg"')
+    true = 40.0 * np.sin(3.0 * pendulum.time)
+    size = np.floor(3600.0 * np.abs(true))
+    written = size // 3600 + size % 3600 // 60 / 100 + size % 60 / 10000
+    for degrees, is_named in ((true, False), (np.round(2.0 * true) / 2.0, False), (written, True)):
+        kept = np.floor(10**places * np.abs(degrees) + 1e-6) / 10**places
+        path = write_csv(pendulum.columns() | {"angle": np.copysign(kept, true)})
+        outcome = imported(path, map_text=text)
+        assert outcome.code == 0, outcome.err
+        assert ("decimals never reach .60" in outcome.printed) == is_named
+
+
 def test_a_torque_that_is_cut_off_is_named(imported, pendulum, write_csv):
     columns = pendulum.columns()
     assert "at full slope" not in imported(write_csv(columns)).printed

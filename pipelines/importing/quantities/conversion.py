@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from pipelines.importing.finding import Note, counted
 from pipelines.importing.quantities.expression import Expression
-from pipelines.importing.quantities.numbers import TAKEN_FOR_MISSING, numbers
+from pipelines.importing.quantities.numbers import TAKEN_FOR_MISSING, have_minutes, numbers
 from pipelines.importing.quantities.wraparound import (
     full_at,
     note_guessed_turns,
@@ -18,7 +18,7 @@ from pipelines.importing.quantities.wraparound import (
     with_sign_bit,
 )
 from pipelines.settings.import_map import ReadingSettings
-from pipelines.settings.units import Unit
+from pipelines.settings.units import UNITS, Unit
 
 
 def columns_of(reading: ReadingSettings, where: str) -> tuple[str, ...]:
@@ -77,6 +77,9 @@ def quantity(
     # An infinite value, as of an expression that divides by zero, is as little known as none.
     raw = np.where(np.isinf(raw), np.nan, raw)
     unit, wraps_at = reading.known_unit, reading.wraps_at
+    if unit == UNITS["deg"] and have_minutes(raw):
+        seen = "decimals never reach .60, as minutes and seconds after a point do"
+        note(seen, "read as decimals of a degree; write decimal degrees to the log if they are not")
     if wraps_at is None:
         full = full_at(raw, _turns(reading, unit))
         if turns:

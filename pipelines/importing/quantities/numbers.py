@@ -138,6 +138,24 @@ def frames_in_a_second(values: NDArray) -> int | None:
     return count if step > 0 and count < full and goes_on and starts_over else None
 
 
+def have_minutes(degrees: NDArray) -> bool:
+    """Return whether decimals of degrees (n,) are minutes, as in 12.5930 for 12° 59' 30".
+
+    They then never reach .60, although a motion that passes many degrees comes to all decimals.
+    """
+    # Whole degrees that are passed, and hundredths that occur: decimals of coarse steps are few.
+    passed, many = 10, 30
+    size = np.abs(degrees[np.isfinite(degrees)])
+    # A decimal fraction lies next to its float, on either side.
+    hundredths = np.floor(100.0 * size + 1e-6).astype(np.int64)
+    whole, parts = np.divmod(hundredths, 100)
+    return bool(
+        np.count_nonzero(np.diff(whole)) >= passed
+        and parts.max() < 60
+        and len(np.unique(parts)) >= many
+    )
+
+
 def _minutes(text: pd.Series) -> pd.Series:
     """Return minutes and seconds (n,) as dates; without a fraction they may be hours."""
     parts = text.str.extract(r"^(\d{1,4}):([0-5]\d\.\d{1,9})$").astype("string")

@@ -15,6 +15,8 @@ from pipelines.importing.sources.header import (
     is_scaling,
     looks_like_number,
     scaling_of,
+    units_beside,
+    units_of,
 )
 from pipelines.importing.sources.source import numbered_twins
 from pipelines.settings.base import repeated
@@ -146,7 +148,7 @@ def find_dialect(start: bytes, whole: bool, settings: SourceSettings) -> Dialect
         table.width,
         frozenset(apart[k] for k in table.numeric),
         table.heads(below),
-        named.units,
+        {apart[k]: unit for k, unit in table.units(below).items()} | named.units,
         {apart[k]: apart[clock] for k, clock in named.clocks.items()},
         {apart[k]: text for k, text in table.scaling(below).items()},
         table.fields(below) if settings.columns or named.remark else (),
@@ -236,6 +238,13 @@ class _Table:
     def scaling(self, lines: Sequence[str]) -> dict[int, str]:
         """Return the factors and offsets above the rows, by the places of their columns."""
         return scaling_of(self._above(lines), self.width)
+
+    def units(self, lines: Sequence[str]) -> dict[int, str]:
+        """Return the units that a line, or cells beside the rows, give to columns by places."""
+        # Rows beside which settings may stand.
+        settings = 50
+        beside = units_beside([row for _, row in self.blocks[0][:settings]], self.numeric)
+        return beside | units_of(self._above(lines), self.width)
 
     def fields(self, lines: Sequence[str]) -> tuple[str, ...]:
         """Return the fields of all lines above the rows."""

@@ -16,6 +16,10 @@ _OF_FACTORS = (
 FACTORS = frozenset(word for words in _OF_FACTORS for word in words.split())
 OFFSETS = frozenset({"offset", "offsets", "bias", "nullpunkt", "décalage"})
 """Words that begin a line of numbers by which the values below may have to be scaled."""
+UNITS_OF_VALUES = frozenset(
+    {"unit", "units", "verticalunit", "verticalunits", "yunit", "yunits", "einheit", "einheiten"}
+)
+"""Words that begin a line of the values' units; that of the clock is another one."""
 Line = Sequence[str]
 
 
@@ -63,6 +67,46 @@ def scaling_of(above: Sequence[Line], width: int) -> dict[int, str]:
             if looks_like_number(text) and not _is(text, neutral):
                 scaling[k] = ", ".join(filter(None, (scaling.get(k), f"{line[0].strip()} {text}")))
     return scaling
+
+
+def units_of(above: Sequence[Line], width: int) -> dict[int, str]:
+    """Return the units of columns that a line with a key gives, by their places.
+
+    Parameters
+    ----------
+    above : sequence of sequences of str
+        Fields of the lines above the rows, without marks of comments.
+    width : int
+        Fields of a row.
+    """
+    units: dict[int, str] = {}
+    for line in above:
+        stripped = _stripped(line)
+        if not stripped or _key(stripped[0]) not in UNITS_OF_VALUES:
+            continue
+        # The key may stand before the first column, or in its place, as above a clock.
+        if len(stripped) in (width, width + 1):
+            first = 1 if len(stripped) == width else 0
+            units |= {k: unit for k, unit in enumerate(stripped[1:], first) if unit_named(unit)}
+    return units
+
+
+def units_beside(rows: Sequence[Line], numeric: Sequence[int]) -> dict[int, str]:
+    """Return the unit of all values that an oscilloscope writes to the left of its rows.
+
+    Parameters
+    ----------
+    rows : sequence of sequences of str
+        Fields of the first rows.
+    numeric : sequence of int
+        Places of the columns of numbers, of which the first is the clock.
+    """
+    found = {
+        row[1].strip()
+        for row in rows
+        if len(row) > 1 and _key(row[0]) in UNITS_OF_VALUES and unit_named(row[1].strip())
+    }
+    return dict.fromkeys(numeric[1:], found.pop()) if len(found) == 1 else {}
 
 
 def _is(text: str, number: float) -> bool:
