@@ -70,7 +70,7 @@ def is_gray(register: Register, values: NDArray) -> bool:
     values : (n,) array
         New values in a row, as it reads them, SI units.
     """
-    # Steps that are no coincidence, and the share of the way that they leave.
+    # Values that are no coincidence, and the share of the travel that bytes of their own leave.
     enough, least = 30, 0.5
     if not _is_judged(register) or len(values) <= enough:
         return False
@@ -158,18 +158,20 @@ def is_low_byte(register: Register, values: NDArray) -> bool:
     values : (n,) array
         New values in a row, as it reads them, SI units.
     """
-    # Steps that are no coincidence, and the share of the way that they leave.
+    # Values that are no coincidence, and the share of the travel that bytes of their own leave.
     enough, least = 30, 0.5
     if not _is_judged(register) or register.bits != 16 or len(values) <= enough:
         return False
     raw = np.array(_raw(register, values), dtype=np.uint16)
     low, high = (raw & np.uint16(0xFF)).astype(np.uint8).view(np.int8), raw >> np.uint16(8)
-    way = np.abs(np.diff(raw.astype(float))).sum()
-    # Zero is passed by a number, too, from the lowest to the highest.
-    turned = np.abs(np.diff(raw.view(np.int16).astype(float))).sum()
-    apart = np.abs(np.diff(low.astype(float))).sum()
-    apart += 256.0 * np.abs(np.diff(high.astype(float))).sum()
-    return bool(apart < least * min(way, turned))
+    # A number passes from its lowest value to its highest, too, if its sign is misread.
+    as_number = min(_travel(raw), _travel(raw.view(np.int16)))
+    return _travel(low) + 256.0 * _travel(high) < least * as_number
+
+
+def _travel(values: NDArray) -> float:
+    """Return the sum of the magnitudes of all steps of values (n,)."""
+    return float(np.abs(np.diff(values.astype(float))).sum())
 
 
 def _is_judged(register: Register) -> bool:
