@@ -36,15 +36,14 @@ def are_held(values: NDArray) -> bool:
     new = new_values(values)
     if len(new) < MANY:
         return False
-    rows = np.diff(new)
-    # A joint that rests repeats its values for long, whether they are held or not.
-    rows = rows[rows <= 10 * np.median(rows)]
-    repeats = 1.0 - len(rows) / rows.sum()
+    # A joint that rests, or a torque that is cut off, repeats its values, too. A stretch of rows
+    # counts once, however long it is.
+    repeats = float(np.mean(np.diff(new) > 1))
     # From the lowest on, as a large offset has no share in their rounding.
     step = smallest_step(values[new] - values[new].min())
     if np.isinf(step):
         return False
     jump = float(np.median(np.abs(np.diff(values[new])))) / step
-    # Noise with a median jump of k steps repeats a reading by chance in about one of 4 k rows. A
+    # Noise with a median jump of k steps repeats a reading by chance in about one of 4 k values. A
     # share four times as large, with a margin of 5 %, is not chance.
     return bool(repeats > 0.05 + 1.0 / jump)

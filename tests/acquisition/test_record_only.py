@@ -60,6 +60,8 @@ CLOCK = """\
 sequence = { address = 100, type = "uint32" }
 time = { address = 102, type = "uint32", unit = "us" }
 """
+ANSWER_S = 0.001
+"""How long a served device takes to answer, as real ones do; else it keeps a processor busy."""
 REAL = {"[plant]\n": "[plant]\nsample_rate_hz = 40.0\n"}
 
 
@@ -148,6 +150,7 @@ def a_device(answer, most_answers=10**9, answers_as=lambda unit: unit):
                 if len(head) < 7:
                     return
                 content = link.recv(int.from_bytes(head[4:6], "big") - 1, socket.MSG_WAITALL)
+                time.sleep(ANSWER_S)
                 asked.add(content[0])
                 first, count = struct.unpack(">HH", content[1:5])
                 now = round(100.0 * (time.monotonic() - began))
