@@ -21,6 +21,10 @@ from tests.once import FOLDER
 signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
+WAITING = {"acquisition", "faults"}
+"""Folders of tests that wait for devices, in real time, for more than half of theirs."""
+
+
 def pytest_configure(config):
     # Workers of pytest-xdist inherit it, and have a workerinput.
     if not hasattr(config, "workerinput"):
@@ -30,8 +34,18 @@ def pytest_configure(config):
 
 
 def pytest_collection_modifyitems(items):
-    """Begin with the files that take long, so that both workers end at about the same time."""
-    items.sort(key=lambda item: item.get_closest_marker("long") is None)
+    """Begin with the files that take long, and mix those that wait for devices with the others.
+
+    Workers then end at about the same time, and there is one that computes while another waits.
+    """
+    waiting = [item for item in items if WAITING & set(item.path.parts)]
+    others = [item for item in items if not WAITING & set(item.path.parts)]
+    place = {}
+    for some in (waiting, others):
+        some.sort(key=lambda item: item.get_closest_marker("long") is None)
+        files = list(dict.fromkeys(item.path for item in some))
+        place |= {path: k / len(files) for k, path in enumerate(files)}
+    items[:] = sorted(waiting + others, key=lambda item: place[item.path])
 
 
 def pytest_collection_finish():

@@ -12,7 +12,7 @@ from pipelines.mechanics.machine import THE_LEG
 from pipelines.settings.design import DesignSettings
 from pipelines.settings.rig.plant import PlantSettings
 
-QUICK = DesignSettings(harmonics=3, particles=24, iterations=50)
+QUICK = DesignSettings(harmonics=3, particles=12, iterations=50)
 
 
 @pytest.fixture(scope="module")
