@@ -243,3 +243,14 @@ def test_an_integer_is_not_taken_for_a_float_or_for_two_bytes(friction, noise, p
             new = counts[np.flatnonzero(np.diff(counts, prepend=np.nan))]
             assert not is_float16(SIGNED_WORD, new)
             assert not is_low_byte(SIGNED_WORD, new)
+
+
+@pytest.mark.parametrize("kind", ["int32", "uint32"])
+def test_a_number_of_24_bits_without_its_sign_in_a_register_of_32_is_named(kind):
+    """As of a 24-bit converter; a true value of 32 bits may be as large."""
+    true = np.round(2e5 * SWING)
+    register = Register(address=0, type=kind, scale=2e-5)
+    (text,) = misread("torque", register, "x", 2e-5 * (true % 2.0**24))
+    assert "negative values of 24 bits are read as large ones" in text
+    signed = Register(address=0, type="int32", scale=2e-5)
+    assert not list(misread("torque", signed, "x", 2e-5 * true))
