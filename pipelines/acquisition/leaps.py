@@ -91,6 +91,17 @@ def sign_leap(register: Register, where: str, values: NDArray) -> str | None:
             f" {bits - 1}"
             + (". Or it is a float of 16 bits, which no key reads" if bits == 16 else "")
         )
+    elif full is not None and full < 2.0 ** (bits - 1) and _is_unsigned_of(full, register, values):
+        remedy = (
+            f"negative values of {np.log2(full):.0f} bits are read as large ones; let the device"
+            f" fill all {bits} bits with their sign, as no key reads a shorter number"
+        )
     else:
         return None
     return f"leaps by {full:.0f} counts where it changes its sign: {remedy}"
+
+
+def _is_unsigned_of(full: float, register: Register, values: NDArray) -> bool:
+    """Return whether values fill a shorter register from both of its ends, without a sign."""
+    counts = (values[np.isfinite(values)] - register.si[1]) / register.si[0]
+    return bool(counts.min() > -0.5 and counts.max() < full)

@@ -18,6 +18,7 @@ from pipelines.settings.rig import Register
 from pipelines.signals.cut_off import cut_off_at
 from pipelines.signals.folded import is_folded
 from pipelines.signals.held import are_held, new_values
+from pipelines.signals.leaping import leaps
 from pipelines.signals.rescaled import is_rescaled
 from pipelines.signals.sampling import sample_rate
 
@@ -148,6 +149,25 @@ def held(time_s: NDArray, values: NDArray) -> Iterator[str]:
         yield (
             f"new values come at {rate_hz:.3g} Hz, and rows at {sample_rate(time_s):.3g} Hz; let"
             " the device or gateway renew its registers faster, or record at that rate"
+        )
+
+
+def leaping(time_s: NDArray, values: NDArray) -> Iterator[str]:
+    """Yield that an angle leaps, as after a gateway repeated old values of a silent device.
+
+    Parameters
+    ----------
+    time_s : (n,) array
+        Of each row, s.
+    values : (n,) array
+        In any unit, NaN where missing.
+    """
+    rows = leaps(time_s, values)
+    if len(rows):
+        yield (
+            f"values leap, first by {abs(values[rows[0]] - values[rows[0] - 1]):.4g} at"
+            f" {time_s[rows[0]]:.4g} s, as no mass can; a gateway may repeat old values until"
+            " then; let it answer with an exception where a device is silent"
         )
 
 

@@ -18,7 +18,7 @@ import pandas as pd
 from pipelines.acquisition.machine.read_only import ReadOnlyMachine, ReadOnlyRow
 from pipelines.acquisition.machine.torn_words import TornRows
 from pipelines.acquisition.machine.turns import LastingLeap
-from pipelines.acquisition.misread import held, misread
+from pipelines.acquisition.misread import held, leaping, misread
 from pipelines.acquisition.modbus.exclusive_access import exclusive_access
 from pipelines.acquisition.modbus.file_lock import locked
 from pipelines.acquisition.pacing import LEAN
@@ -109,7 +109,8 @@ def misread_values(path: Path, rig_path: Path) -> list[str]:
             column, where = f"{joint.joint}_{quantity}_{unit}", f"map.drive.{joint.map}.read"
             values = frame[column].to_numpy()
             texts = misread(quantity, register, f"{where}.{quantity}", values)
-            for text in (*texts, *held(time_s, values)):
+            moves = leaping(time_s, values) if quantity == "angle" and not register.turn else ()
+            for text in (*texts, *held(time_s, values), *moves):
                 channels.setdefault(text, []).append(column)
     warnings = [f"{path}: {', '.join(columns)}: {text}" for text, columns in channels.items()]
     if table.metadata["run"] == "exo_alone":  # a person may move the drives

@@ -11,7 +11,7 @@ from pipelines.acquisition.encodings import (
     is_half_of_float64,
     is_low_byte,
 )
-from pipelines.acquisition.misread import misread
+from pipelines.acquisition.misread import leaping, misread
 from pipelines.modbus.register_block import Block
 from pipelines.settings.rig import Register
 
@@ -243,3 +243,25 @@ def test_an_integer_is_not_taken_for_a_float_or_for_two_bytes(friction, noise, p
             new = counts[np.flatnonzero(np.diff(counts, prepend=np.nan))]
             assert not is_float16(SIGNED_WORD, new)
             assert not is_low_byte(SIGNED_WORD, new)
+
+
+@pytest.mark.parametrize("kind", ["int32", "uint32"])
+def test_a_number_of_24_bits_without_its_sign_in_a_register_of_32_is_named(kind):
+    """As of a 24-bit converter; a true value of 32 bits may be as large."""
+    true = np.round(2e5 * SWING)
+    register = Register(address=0, type=kind, scale=2e-5)
+    (text,) = misread("torque", register, "x", 2e-5 * (true % 2.0**24))
+    assert "negative values of 24 bits are read as large ones" in text
+    signed = Register(address=0, type="int32", scale=2e-5)
+    assert not list(misread("torque", signed, "x", 2e-5 * true))
+
+
+def test_an_angle_that_leaps_after_old_values_is_named():
+    time_s = 0.02 * np.arange(len(SWING))
+    assert not list(leaping(time_s, SWING))
+    held = np.where((time_s > 2.0) & (time_s < 3.0), SWING[100], SWING)
+    (text,) = leaping(time_s, held)
+    assert "as no mass can" in text
+    # Steps of a coarse reading, and of a joint that is moved from stop to stop, are none.
+    assert not list(leaping(time_s, np.round(5.0 * SWING) / 5.0))
+    assert not list(leaping(time_s, np.where(time_s > 3.0, 1.0, 1e-4 * SWING)))

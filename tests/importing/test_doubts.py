@@ -475,3 +475,41 @@ def test_a_clock_that_wraps_around_after_whole_hours_is_proposed_and_unsure(
     text, doubts = guessed(write_csv(columns))
     assert tomllib.loads(text)["time"]["wraps_at"] == 36000.0
     assert "time.restarts" in doubts["time.wraps_at"]
+
+
+@pytest.mark.parametrize(
+    ("first", "second", "named"),
+    [
+        ("Trial 1", "Trial 2", "trial_1, trial_2 may be runs or"),
+        ("run1", "run2", "run_1, run_2 may be runs or"),
+        ("avg", "max", "avg, max may be runs or"),
+        ("hip max", "hip avg", "hip_max, hip_avg may be runs or"),
+        ("hip max", "knee max", ""),
+        ("trial 1 hip", "trial 1 knee", ""),
+        ("1", "2", ""),
+    ],
+)
+def test_columns_of_runs_or_statistics_are_in_doubt_as_joints(
+    guessed, pendulum, write_csv, first, second, named
+):
+    """As in a workbook with the runs of a machine side by side, or a logger's table of means."""
+    columns = {"Time (s)": pendulum.time}
+    for k, name in enumerate((first, second)):
+        columns[f"{name} angle (deg)"] = np.degrees(np.roll(pendulum.angle, 300 * k))
+        columns[f"{name} torque (Nm)"] = np.roll(pendulum.torque, 300 * k)
+    text, doubts = guessed(write_csv(columns))
+    assert len(tomllib.loads(text)["joint"]) == 2
+    assert ("joint.name" in doubts) == bool(named)
+    assert named in doubts.get("joint.name", "")
+
+
+def test_a_name_that_pandas_numbered_is_the_same_name_twice(guessed, pendulum, write_csv):
+    columns = pendulum.columns()
+    columns = {"time [s]": columns["time"]} | {
+        f"{name}{twin}": np.roll(columns[quantity], 300 * k)
+        for k, twin in enumerate(("", ".1"))
+        for name, quantity in (("angle [rad]", "angle"), ("torque [Nm]", "torque"))
+    }
+    text, doubts = guessed(write_csv(columns))
+    assert len(tomllib.loads(text)["joint"]) == 1
+    assert doubts["joint[0].angle.column"] == "no name shows which, rather than angle [rad].1"

@@ -583,6 +583,16 @@ def test_a_torque_whose_decimal_point_moves_is_named(imported, pendulum, write_c
     assert "pivot_torque_nm: leaps by a factor of ten, and back" in printed
 
 
+def test_an_angle_that_leaps_is_named(imported, pendulum, write_csv):
+    """As where a drive writes its ring buffer from its first row on, and not from the oldest."""
+    columns = pendulum.columns()
+    columns = {name: values[:1500] for name, values in columns.items()}
+    turned = {name: np.roll(columns[name], 700) for name in columns if name != "time"}
+    printed = imported(write_csv(columns | turned)).printed
+    assert "pivot_angle_rad: leaps once, first from" in printed
+    assert "as no mass can" not in imported(write_csv(columns)).printed
+
+
 def test_a_torque_of_one_sign_that_only_touches_zero_lacks_none(imported, pendulum, write_csv):
     """As that of a brake, or of a joint that always carries its load to one side."""
     columns = pendulum.columns() | {"torque": 1.0 - np.cos(6.0 * pendulum.time)}

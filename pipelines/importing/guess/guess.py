@@ -14,6 +14,7 @@ from pipelines.importing.guess.joints import (
     TURNING,
     JointColumns,
     group_joints,
+    may_be_one,
     moving,
     order_is_known,
 )
@@ -106,6 +107,9 @@ def propose(paths: Sequence[Path]) -> Proposal:
     if resting:
         rests = f"{', '.join(resting)} rest while others move, and are left out"
         proposal.doubt("joint", f"{rests}; with them, name their columns too")
+    if one := may_be_one(joints):
+        runs = f"{', '.join(one)} may be runs or statistics of one joint"
+        proposal.doubt("joint.name", f"{runs}; then leave one, and write a map for each other run")
     if not time.unit_sure and any("velocity" in joint.columns for joint in joints):
         proposal.doubt("joint.velocity.unit", "follows from the unit of time, which is unsure")
     _doubt_scales(proposal, source, used)

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipelines.importing.guess.torque import fit_torque
-from pipelines.importing.naming.meaning import SIDES, Meaning, in_counts
+from pipelines.importing.naming.meaning import RUNS, SIDES, STATISTICS, Meaning, in_counts
 from pipelines.importing.quantities.consistency import integral_agreement, likeliest_integrals
 from pipelines.importing.quantities.numbers import are_whole
 from pipelines.settings.units import UNITS
@@ -164,6 +164,16 @@ def order_is_known(joints: Sequence[JointColumns]) -> bool:
         return True
     places = [_place(joint) for joint in joints]
     return 0 not in places and len(set(places)) == len(places)
+
+
+def may_be_one(joints: Sequence[JointColumns]) -> list[str]:
+    """Return the names of joints that may be one: those of its runs, or of its statistics."""
+    # The number of a run follows its word: trial_1_hip is of the hip.
+    run = re.compile(rf"(?<![^_])(?:(?:{'|'.join(RUNS)})(?:_?\d+)?|{'|'.join(STATISTICS)})(?![^_])")
+    by_rest: dict[str, list[str]] = {}
+    for joint in joints:
+        by_rest.setdefault(run.sub("", joint.name).strip("_"), []).append(joint.name)
+    return [name for names in by_rest.values() if len(names) > 1 for name in names]
 
 
 def _counted(meaning: Meaning, values: NDArray) -> Meaning:

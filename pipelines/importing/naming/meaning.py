@@ -74,10 +74,19 @@ NOISE = _words(
 """Words that are no part of a joint's name."""
 JOINTS = {"huefte": "hip", "hueft": "hip", "hanche": "hip", "knie": "knee", "genou": "knee"}
 """Translations of a leg's joints."""
+RUNS = _words(
+    "trial run rep repetition repeat test pass attempt versuch messung lauf wiederholung essai"
+)
+"""Words that distinguish runs of one machine, and no joints."""
+STATISTICS = _words(
+    "max maximum min minimum avg average mean median std sd stdev dev sem peak mittel mittelwert"
+    " moyenne mittlere"
+)
+"""Words of what is kept of several samples of one quantity."""
 SLIDES = _words("position displacement travel stroke weg hub course")
 """Words of positions in metres; the m of ``theta_m`` is a motor's."""
-TWIN = re.compile(r"#\d+$")
-"""Number of columns with the same name."""
+TWIN = re.compile(r"#\d+$|(?<=[\])])\.\d+$")
+"""Number of columns with the same name, of exoid or, after a unit, of pandas."""
 SYMBOLS = _words("q qm th phi")
 """Of an angle, but also of an axis of a motor's current, ``i_q``."""
 SIGNS = _words("n v w s f")

@@ -19,6 +19,7 @@ from pipelines.settings.import_map import ImportMap, JointSettings
 from pipelines.signals.cut_off import cut_off_at
 from pipelines.signals.folded import is_folded
 from pipelines.signals.held import new_values
+from pipelines.signals.leaping import leaps
 from pipelines.signals.power import absorbed_w
 from pipelines.signals.rescaled import is_rescaled
 
@@ -70,6 +71,7 @@ def check(columns: Mapping[str, NDArray], settings: ImportMap) -> Iterator[Findi
         yield from _too_short(columns, joint)
         yield from _turns_on(columns, joint)
         yield from _slips(columns, joint)
+        yield from _leaps(columns, joint)
         yield from _too_strong(columns, joint)
         for quantity in _torque_of(joint):
             name = joint.joint.column(quantity)
@@ -163,6 +165,24 @@ def _slips(columns: Mapping[str, NDArray], joint: JointSettings) -> Iterator[Fin
                 f" {middle + usual:.4g}"
             )
             yield Finding(name, seen, "kept; to exclude an outlier, set a range at the reading")
+
+
+def _leaps(columns: Mapping[str, NDArray], joint: JointSettings) -> Iterator[Finding]:
+    """Report an angle that leaps, as where records are put together."""
+    name = joint.joint.column("angle")
+    rows = leaps(columns["time_s"], columns[name])
+    if len(rows):
+        before, after = columns[name][rows[0] - 1 : rows[0] + 1]
+        times = "once" if len(rows) == 1 else f"{len(rows)} times"
+        seen = (
+            f"leaps {times}, first from {before:.4g} to {after:.4g} at"
+            f" {columns['time_s'][rows[0]]:.6g} s, as no mass can"
+        )
+        action = (
+            "kept; rows there may be of two records, in another order, or repeat an old value:"
+            " divide the log there with span_s"
+        )
+        yield Finding(name, seen, action)
 
 
 def _every_kth(values: NDArray) -> NDArray:
