@@ -15,7 +15,7 @@ from pipelines.importing.sources.header import (
     is_scaling,
     looks_like_number,
     scaling_of,
-    units_beside,
+    units_left_of,
     units_of,
 )
 from pipelines.importing.sources.source import numbered_twins
@@ -240,11 +240,11 @@ class _Table:
         return scaling_of(self._above(lines), self.width)
 
     def units(self, lines: Sequence[str]) -> dict[int, str]:
-        """Return the units that a line, or cells beside the rows, give to columns by places."""
-        # Rows beside which settings may stand.
+        """Return the units that a line, or cells left of the rows, give to columns by places."""
+        # Rows left of which settings may stand.
         settings = 50
-        beside = units_beside([row for _, row in self.blocks[0][:settings]], self.numeric)
-        return beside | units_of(self._above(lines), self.width)
+        left = units_left_of([row for _, row in self.blocks[0][:settings]], self.numeric)
+        return left | units_of(self._above(lines), self.width)
 
     def fields(self, lines: Sequence[str]) -> tuple[str, ...]:
         """Return the fields of all lines above the rows."""

@@ -91,7 +91,7 @@ def units_of(above: Sequence[Line], width: int) -> dict[int, str]:
     return units
 
 
-def units_beside(rows: Sequence[Line], numeric: Sequence[int]) -> dict[int, str]:
+def units_left_of(rows: Sequence[Line], numeric: Sequence[int]) -> dict[int, str]:
     """Return the unit of all values that an oscilloscope writes to the left of its rows.
 
     Parameters
@@ -101,12 +101,12 @@ def units_beside(rows: Sequence[Line], numeric: Sequence[int]) -> dict[int, str]
     numeric : sequence of int
         Places of the columns of numbers, of which the first is the clock.
     """
-    found = {
+    units = {
         row[1].strip()
         for row in rows
         if len(row) > 1 and _key(row[0]) in UNITS_OF_VALUES and unit_named(row[1].strip())
     }
-    return dict.fromkeys(numeric[1:], found.pop()) if len(found) == 1 else {}
+    return dict.fromkeys(numeric[1:], units.pop()) if len(units) == 1 else {}
 
 
 def _is(text: str, number: float) -> bool:
