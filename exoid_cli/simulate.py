@@ -1,5 +1,6 @@
 """``exoid simulate``: the identified leg under the adaptive controller, or a recording's replay."""
 
+from math import isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
@@ -197,6 +198,7 @@ def _replay(table: "Table", recording: Path, settings: "Experiment", output: Pat
     from pipelines.contracts import SIMULATION, describe
     from pipelines.dynamics.plant import plant_from_table
     from pipelines.dynamics.replay import replay
+    from pipelines.errors import InputError
     from pipelines.mechanics.even_grid import on_even_grid
     from pipelines.mechanics.read import geometry_from, read_motion
     from pipelines.simulation import recorded
@@ -205,6 +207,11 @@ def _replay(table: "Table", recording: Path, settings: "Experiment", output: Pat
     plant = plant_from_table(table, motion.run, motion.geometry, recording)
     with console.working(f"replaying {recording.name}"):
         replayed = replay(plant.model, motion)
+    if not all(map(isfinite, replayed.rmse.tolist())):
+        raise InputError(
+            f"{recording}: its simulation with {table.path} diverges within 1 s; identify again"
+            " from richer motions, and check parameters whose interval contains 0 (`exoid show`)"
+        )
     open_loop, closed_loop = recorded.open_loop_frame(replayed, motion, plant.joints), None
     inputs = [path for path in (table.path, recording) if path]
     config = settings.sections_about(plant.machine.is_exoskeleton, "filter", "mechanism")

@@ -108,7 +108,10 @@ def replay(
         # A motor hardly warms within a window.
         a.temperature[:] = temperature[k]
         start = states[k].copy(), memory[k].copy(), load[k].copy()
-        _window(a, w, s, motion.time[k:], torque[k:], parts, *start, window)
+        try:
+            _window(a, w, s, motion.time[k:], torque[k:], parts, *start, window)
+        except ZeroDivisionError:  # at such speeds rounding leaves no mass
+            window[:] = np.nan
     samples = first[:, np.newaxis] + np.arange(length + 1)
     # Errors are those of the motors' angles, after the encoders' own errors were removed.
     return ReplayResult(first, out[:, :, 0], out[:, :, 1], motor.q[samples] - out[:, :, 0])

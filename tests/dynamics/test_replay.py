@@ -78,3 +78,10 @@ def test_a_recording_shorter_than_a_window_is_refused(leg, recorded):
         == "the motion: no stretch of valid samples lasts the 60 s of a window; replay a longer"
         " recording without gaps"
     )
+
+
+def test_a_model_that_diverges_has_no_error(leg, recorded):
+    """A shank of nearly no inertia whose friction drives it, as fitted where nothing moves it."""
+    light = Term(RigidBody(), np.array([0.9, 1e-4, 1e-4, 2.0]))
+    pushed = Term(Friction("knee"), np.array([4.6, -0.28]))
+    assert not np.isfinite(replay(Model((light, leg.terms[1], pushed)), recorded).rmse).all()

@@ -158,6 +158,18 @@ def test_replay_without_a_controller_skips_the_closed_loop_and_says_why(
     assert made.exists() and not (tmp_path / "replay-closed-loop.parquet").exists()
 
 
+def test_a_model_whose_replay_diverges_is_refused_and_nothing_is_written(
+    exoid, parameters_file, recording_file, quick, tmp_path
+):
+    parameters = parameters_file(((0.9, 1e-4, 1e-4, 2.0), (3.0, 4.6), (2.0, -0.28)))
+    made, recording = tmp_path / "replay.parquet", recording_file()
+    code, _, err = exoid(
+        "simulate", parameters, "--config", quick(), "--replay", recording, "-o", made
+    )
+    assert code == 2 and not made.exists()
+    assert err.startswith(f"exoid: {recording}: its simulation with {parameters} diverges within")
+
+
 @pytest.mark.parametrize(
     "cause",
     [
