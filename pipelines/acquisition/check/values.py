@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from pipelines.acquisition.check.finding import Finding
 from pipelines.acquisition.check.probe import Probe, Series
 from pipelines.acquisition.misread import held, misread
+from pipelines.signals.held import new_values
 
 
 def check_values(probe: Probe, series: Series, rate_hz: float | None) -> Iterator[Finding]:
@@ -31,8 +32,23 @@ def check_values(probe: Probe, series: Series, rate_hz: float | None) -> Iterato
         for text in misread(name, register, where, values[series.fresh]):
             yield Finding(probe.name, f"{name}: {text}", name, is_explained=True)
         if rows is not None and name in ("angle", "torque", "current"):
+            if not _is_renewed_slower(series, values, rows):
+                continue
             for text in held(series.answered[rows], values[rows]):
                 yield Finding(probe.name, f"{name}: {text}")
+
+
+def _is_renewed_slower(series: Series, values: NDArray, rows: NDArray) -> bool:
+    """Return whether all readings, too, have new values less often than there are rows.
+
+    A row that is read late has the next sample's value, and then it comes in two rows.
+    """
+    slower = 1.05
+    new = new_values(values)
+    if min(len(new), len(rows)) < 2:
+        return False
+    new_s, row_s = (float(np.median(np.diff(series.answered[some]))) for some in (new, rows))
+    return new_s > slower * row_s
 
 
 def _rows(series: Series, rate_hz: float | None) -> NDArray | None:
