@@ -99,6 +99,7 @@ def test_a_design_decides_what_the_usual_excitation_leaves_open(usual):
     assert np.array_equal(again.a, result.design.trajectory.a)
 
 
+@pytest.mark.slow
 def test_where_a_motion_surely_decides_the_parameters_count(usual):
     quick = replace(RUNS, settings=QUICK.changed(particles=12))
     result = separating_design(separation_of_last(named(*EASY), quick, usual), quick, Geometry())
