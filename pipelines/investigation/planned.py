@@ -13,9 +13,9 @@ from pipelines.diagnosis.evidence.baseline import baseline_of
 from pipelines.diagnosis.evidence.block_rate import at_block_rate
 from pipelines.diagnosis.evidence.known_effects import known_effects
 from pipelines.diagnosis.evidence.observed_run import observe
+from pipelines.effects import Effect
 from pipelines.effects.effect import Family
 from pipelines.errors import InputError
-from pipelines.investigation.rivals import Rival
 from pipelines.mechanics.trajectory import Trajectory
 from pipelines.settings.design import DesignSettings
 from pipelines.settings.rig.plant import PlantSettings
@@ -52,21 +52,21 @@ class PlannedRuns:
             )
         return replace(self, kinds=tuple(verdict.runs), noise_nm=(noise["hip"], noise["knee"]))
 
-    def problem(self, trajectory: Trajectory, rivals: Sequence[Rival]) -> DetectionProblem:
+    def problem(self, trajectory: Trajectory, effects: Sequence[Effect]) -> DetectionProblem:
         """Return the detection problem of the runs.
 
-        Where no rival depends on time, one period counts as often as it is repeated.
+        Where no effect depends on time, one period counts as often as it is repeated.
 
         Parameters
         ----------
         trajectory : Trajectory
             Of hip and knee.
-        rivals : sequence of Rival
-            Those that the runs are to separate.
+        effects : sequence of Effect
+            Those that the runs are to show.
         """
         noise, rate_hz = self.settings.noise, self.settings.sample_rate_hz
         period_s, repeats = trajectory.period_s, 1.0
-        if period_s and period_s < noise.duration_s and not any(map(_depends_on_time, rivals)):
+        if period_s and period_s < noise.duration_s and not any(map(_depends_on_time, effects)):
             repeats = noise.duration_s / period_s
             noise = noise.model_copy(update={"duration_s": period_s})
         motions = planned_motions(trajectory, self.plant, noise, self.kinds, rate_hz)
@@ -78,8 +78,8 @@ class PlannedRuns:
         return DetectionProblem.of([at_block_rate(run) for run in observed], baseline, floor)
 
 
-def _depends_on_time(rival: Rival) -> bool:
-    """Return whether a rival's torque differs from one period of the motion to the next."""
-    return rival.effect.family is Family.TIME or any(
-        shape.unit == "Hz" or shape.per_run for shape in rival.effect.shape
+def _depends_on_time(effect: Effect) -> bool:
+    """Return whether an effect's torque differs from one period of the motion to the next."""
+    return effect.family is Family.TIME or any(
+        shape.unit == "Hz" or shape.per_run for shape in effect.shape
     )

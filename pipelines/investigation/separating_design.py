@@ -1,26 +1,21 @@
 """The excitation that separates rival causes best.
 
 The expected log odds of the worst pair are maximized, up to the value from which the pair is
-decided in nearly every experiment. From there on the parameters count, by log det. Motions are
-repaired as in any other search. One takes milliseconds instead of microseconds, so that the swarm
-does not fly: its best particle is polished.
+decided in nearly every experiment. From there on the parameters count, by log det.
 """
 
-import time
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from pipelines.design.evolution import polish
 from pipelines.design.excitation import Design
-from pipelines.design.fitness import costs
 from pipelines.design.quality import quality
-from pipelines.design.search import Report, first_swarm, search_problem, spread_of, trajectory_of
+from pipelines.design.search import Report
 from pipelines.errors import NotIdentifiable
 from pipelines.investigation.planned import PlannedRuns
+from pipelines.investigation.polished_search import polished_search
 from pipelines.investigation.rivals import Rival, SizedRival, sized
 from pipelines.investigation.separation import Separation
 from pipelines.mechanics.fourier import FourierTrajectory
@@ -91,7 +86,7 @@ def separation_of_last(rivals: Sequence[Rival], runs: PlannedRuns, last: Traject
     InputError
         Where such runs cannot show a rival.
     """
-    problem = runs.problem(last, rivals)
+    problem = runs.problem(last, [one.effect for one in rivals])
     return Separation.of(sized(rivals, problem), problem)
 
 
@@ -99,50 +94,31 @@ def separation(
     rivals: Sequence[SizedRival], runs: PlannedRuns, trajectory: Trajectory
 ) -> Separation:
     """Return how well the runs with a trajectory separate rivals."""
-    return Separation.of(rivals, runs.problem(trajectory, [sized.rival for sized in rivals]))
+    effects = [sized.rival.effect for sized in rivals]
+    return Separation.of(rivals, runs.problem(trajectory, effects))
 
 
 def _search(
     rivals: Sequence[SizedRival], runs: PlannedRuns, geometry: Geometry, report: Report
 ) -> tuple[FourierTrajectory, str]:
     """Return the best excitation, and ``stagnation`` or ``seconds`` for what ended the search."""
-    patience, least_gain = 12, 3e-4
-    settings = runs.settings
-    rng = np.random.default_rng(settings.seed)
-    by_log_det = settings.model_copy(update={"criterion": "log_det"})
-    problem = search_problem(by_log_det, geometry, samples=200, samples_per_harmonic=40)
-    spread = spread_of(problem)
-    deadline = time.monotonic() + settings.seconds
-    best_odds, done = -np.inf, 0.0
+    best_odds = -np.inf
 
-    def costs_of(candidates: NDArray) -> NDArray:
+    def cost(trajectory: Trajectory, log_det: float) -> tuple[float, str]:
         nonlocal best_odds
-        log_det = -costs(candidates, problem)  # repairs them
-        separations = [separation(rivals, runs, trajectory_of(one, problem)) for one in candidates]
-        best_odds = max(best_odds, *(one.least() for one in separations))
-        report(done, f"log odds {best_odds:.3g}")
-        return np.array([_cost(*one) for one in zip(separations, log_det, strict=True)])
+        separated = separation(rivals, runs, trajectory)
+        best_odds = max(best_odds, separated.least())
+        return _cost(separated, log_det), f"log odds {best_odds:.3g}"
 
-    swarm = first_swarm(settings, problem, spread, rng)
-    start = swarm.position[np.argmin(costs_of(swarm.position))]
-    if inseparable := separation(rivals, runs, trajectory_of(start, problem)).inseparable():
-        one, other = inseparable[0]
-        raise NotIdentifiable(
-            f"no motion within [design.bounds] separates {one} and {other}: each makes the torque"
-            " of the other. Leave one out; another sensor or a test by hand may decide"
-        )
-    done = 0.5
-    best, _ = polish(
-        start,
-        0.1 * spread,
-        costs_of,
-        rng,
-        out_of_time=lambda: time.monotonic() > deadline,
-        patience=patience,
-        least_gain=least_gain,
-    )
-    stopped_by = "seconds" if time.monotonic() > deadline else "stagnation"
-    return trajectory_of(best, problem), stopped_by
+    def refuse_inseparable(start: Trajectory) -> None:
+        if inseparable := separation(rivals, runs, start).inseparable():
+            one, other = inseparable[0]
+            raise NotIdentifiable(
+                f"no motion within [design.bounds] separates {one} and {other}: each makes the"
+                " torque of the other. Leave one out; another sensor or a test by hand may decide"
+            )
+
+    return polished_search(runs.settings, geometry, cost, report, refuse_inseparable)
 
 
 def _cost(separated: Separation, log_det: float) -> float:

@@ -58,7 +58,7 @@ def undecided_pairs(usual: Trajectory) -> Iterator[tuple[Rival, Rival]]:
 
 def truth_of(rivals: tuple[Rival, Rival], number: int, usual: Trajectory) -> Term:
     """Return a rival as large as predictions take it, at the middle one of its shapes."""
-    found = sized(rivals, RUNS.problem(usual, rivals))[number]
+    found = sized(rivals, RUNS.problem(usual, [one.effect for one in rivals]))[number]
     candidate, amplitude = found.truths[len(found.truths) // 2]
     shape = np.array(candidate.shapes[0])
     linear = np.zeros(len(candidate.effect.linear))

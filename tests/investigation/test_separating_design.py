@@ -50,7 +50,7 @@ def named(*labels):
 
 def of_size(trajectory, share, *labels):
     """Return rivals of a share of their usual torque."""
-    rivals = sized(named(*labels), RUNS.problem(trajectory, named(*labels)))
+    rivals = sized(named(*labels), RUNS.problem(trajectory, [one.effect for one in named(*labels)]))
     return [
         SizedRival(one.rival, tuple((c, share * a) for c, a in one.truths), one.shapes)
         for one in rivals
@@ -150,7 +150,7 @@ def test_a_cause_without_torque_in_the_last_excitation_is_refused(usual):
 def test_a_tie_of_a_fitted_cause_makes_its_torque(usual):
     spring, inertia = named(*EASY)
     fitted = Rival(spring.effect, 0.6, Term(spring.effect, np.array([7.0, 0.0])))
-    problem = RUNS.problem(usual, [fitted, inertia])
+    problem = RUNS.problem(usual, [fitted.effect, inertia.effect])
     truths = [one.truths[0] for one in sized([fitted, inertia], problem)]
     lengths = [a * np.linalg.norm(Appearance.of(one, problem).torque) for one, a in truths]
     assert lengths[1] == pytest.approx(lengths[0])

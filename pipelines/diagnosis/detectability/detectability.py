@@ -177,24 +177,30 @@ def detectability(
     results: dict[Effect, list[DetectionResult]] = {}
     for number, effect in enumerate(effects):
         report(number / len(effects), effect.label)
-        of_shapes = [
-            (_bent if candidate.transforms_motion else _added)(candidate, problem, power)
-            for candidate in shapes_of(effect, problem.runs)
-        ]
-        # Where no shape is plausible, all count: every cause is reported.
-        results[effect] = [one for one in of_shapes if one.plausible] or of_shapes
-    # Share of a family's shapes for which the smallest size suffices, as the shape is unknown
-    # beforehand.
-    usual = 0.8
-    chosen = [
-        sorted(own, key=lambda result: result.rms)[round(usual * (len(own) - 1))]
-        for own in results.values()
-    ]
+        results[effect] = at_each_shape(effect, problem, power)
+    chosen = [usual(own) for own in results.values()]
     unexplained = _unexplained(chosen, list(results.values()))
     return [
         _detectable(effect, result, results, row, float(problem.torque_rms[problem.joint(effect)]))
         for effect, result, row in zip(effects, chosen, unexplained, strict=True)
     ]
+
+
+def at_each_shape(effect: Effect, problem: DetectionProblem, power: float) -> list[DetectionResult]:
+    """Return the smallest size of an effect at each plausible shape."""
+    of_shapes = [
+        (_bent if candidate.transforms_motion else _added)(candidate, problem, power)
+        for candidate in shapes_of(effect, problem.runs)
+    ]
+    # Where no shape is plausible, all count: every cause is reported.
+    return [one for one in of_shapes if one.plausible] or of_shapes
+
+
+def usual(results: Sequence[DetectionResult]) -> DetectionResult:
+    """Return the result that suffices for most shapes, as the shape is unknown beforehand."""
+    # Share of a family's shapes for which the smallest size suffices.
+    most = 0.8
+    return sorted(results, key=lambda result: result.rms)[round(most * (len(results) - 1))]
 
 
 def detectability_of_recorded(
