@@ -6,9 +6,10 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from exoid_cli.console import console
+from exoid_cli.excitation import last_excitation, write_excitation
 from exoid_cli.experiment_folder import settings_in_force
 from exoid_cli.options import ConfigOption
-from exoid_cli.separate import last_excitation, question_of, write_excitation
+from exoid_cli.separate import question_of
 
 if TYPE_CHECKING:
     from pipelines.investigation.next_experiments import NextExperiments

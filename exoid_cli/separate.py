@@ -5,10 +5,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from exoid_cli.console import console
-from exoid_cli.experiment_folder import in_experiment_folder, open_experiment
+from exoid_cli.excitation import show_quality, warn_of_cut, write_excitation
 
 if TYPE_CHECKING:
-    from pipelines.design.excitation import Design
     from pipelines.investigation.planned import PlannedRuns
     from pipelines.investigation.rivals import Rival
     from pipelines.investigation.separation import Separation
@@ -51,33 +50,6 @@ def question_of(
     return rivals, runs
 
 
-def last_excitation(config: Path | None, settings: Any, geometry: Any) -> "tuple[str, Trajectory]":
-    """Return the experiment's excitation, else the one that its settings give, and its name."""
-    from pipelines.design.excitation import design
-    from pipelines.mechanics.trajectory import read_trajectory
-
-    if config is not None or in_experiment_folder():
-        file = open_experiment(config).step("design").target
-        if file.is_file():
-            return str(file), read_trajectory(file)
-    return f"the excitation of {settings.criterion}", design(settings, geometry).trajectory
-
-
-def write_excitation(
-    output: Path,
-    design: "Design",
-    metadata: dict[str, Any],
-    geometry: Any,
-    mechanism: dict[str, Any],
-) -> None:
-    """Write an excitation with its settings."""
-    from pipelines.contracts import TRAJECTORY, describe
-
-    settings = design.settings.model_dump(mode="json")
-    config = {"design": settings, "geometry": vars(geometry)} | mechanism
-    TRAJECTORY.write(output, design.frame(), metadata | describe(config=config))
-
-
 def show_separation(title: str, separation: "Separation") -> None:
     """Show the posterior to expect under each truth."""
     from pipelines.investigation.separation import DECIDED
@@ -94,3 +66,54 @@ def show_separation(title: str, separation: "Separation") -> None:
     console.say(f"\n{title}, the probability of each cause to expect:")
     headings = (*labels, decided)
     console.table(("if it is", *headings), rows, numbers=", ".join(headings))
+
+
+def evaluate_separation(
+    file: Path,
+    settings: Any,
+    geometry: Any,
+    question: Question,
+    last: "tuple[str, Trajectory]",
+) -> None:
+    """Show how well an excitation separates rival causes."""
+    from pipelines.design.quality import quality
+    from pipelines.investigation.separating_design import separation, separation_of_last
+    from pipelines.mechanics.trajectory import read_trajectory
+
+    trajectory = read_trajectory(file)
+    result = quality(trajectory, settings, geometry)
+    rivals, runs = question
+    # As large as in the last excitation, as a design supposes them.
+    before = separation_of_last(rivals, runs, last[1])
+    separated = separation(before.rivals, runs, trajectory)
+    document = {"separation": separated.as_json()}
+    console.emit({"file": str(file), **result.as_metadata(), **document})
+    show_quality(str(file), result)
+    show_separation(f"With {file}", separated)
+    console.say(f"\n{file}: {settings.criterion} {result.value(settings.criterion):.4g}")
+
+
+def design_separation(
+    output: Path,
+    question: "Question",
+    geometry: Any,
+    last: "tuple[str, Trajectory]",
+    mechanism: dict[str, Any],
+) -> None:
+    """Design an excitation that separates rival causes, and write it."""
+    from pipelines.investigation.separating_design import separating_design, separation_of_last
+
+    rivals, runs = question
+    before = separation_of_last(rivals, runs, last[1])
+    with console.progress("designing", total=1.0) as report:
+        result = separating_design(before, runs, geometry, report)
+    write_excitation(output, result.design, result.metadata(), geometry, mechanism)
+    warn_of_cut(result.design)
+    console.emit({"file": str(output), **result.metadata()})
+    show_quality(str(output), result.design.quality)
+    show_separation(f"With {last[0]}", result.before)
+    show_separation("With this one", result.separation)
+    console.say(
+        f"\n{output}: expected log odds of the worst pair {result.separation.least():.3g};"
+        f" stopped by {result.design.stopped_by}"
+    )

@@ -27,6 +27,7 @@ def polished_search(
     cost: Cost,
     report: Report,
     check: Callable[[Trajectory], None] = lambda start: None,
+    least_gain: float = 3e-4,
 ) -> tuple[FourierTrajectory, str]:
     """Return the best excitation, and ``stagnation`` or ``seconds`` for what ended the search.
 
@@ -44,8 +45,10 @@ def polished_search(
         Called with the share that is done, 0 to 1, and a note.
     check : callable, optional
         May refuse the best motion of the first swarm.
+    least_gain : float, optional
+        Relative gain within ``patience`` generations below which the search stagnates.
     """
-    patience, least_gain = 12, 3e-4
+    patience = 12
     rng = np.random.default_rng(settings.seed)
     by_log_det = settings.model_copy(update={"criterion": "log_det"})
     problem = search_problem(by_log_det, geometry, samples=200, samples_per_harmonic=40)

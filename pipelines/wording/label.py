@@ -54,6 +54,9 @@ def effect_at(
     expected = [one.label for one in can_be if one.name == effect.name] or [
         one.label for one in can_be
     ]
+    # More than a line holds.
+    if len(expected) > 8:
+        expected = ["a cause that `exoid effects` lists"]
     raise InputError(
         f"{setting}: found {label}, expected {' or '.join(expected) or 'nothing'}"
         f"{f' ({why})' if why else ''}; correct it or leave it out"

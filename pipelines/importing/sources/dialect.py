@@ -243,8 +243,8 @@ class _Table:
         """Return the units that a line, or cells left of the rows, give to columns by places."""
         # Rows left of which settings may stand.
         settings = 50
-        left = units_left_of([row for _, row in self.blocks[0][:settings]], self.numeric)
-        return left | units_of(self._above(lines), self.width)
+        of_rows = units_left_of([row for _, row in self.blocks[0][:settings]], self.numeric)
+        return of_rows | units_of(self._above(lines), self.width)
 
     def fields(self, lines: Sequence[str]) -> tuple[str, ...]:
         """Return the fields of all lines above the rows."""

@@ -1,0 +1,108 @@
+"""An excitation that is designed for sizes shows causes of these sizes; a usual one does not."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from pipelines.contracts.table import Table
+from pipelines.design.excitation import design
+from pipelines.diagnosis.diagnose import diagnose
+from pipelines.errors import InputError
+from pipelines.investigation.planned import PlannedRuns
+from pipelines.investigation.sizes_design import sizes_design, smallest_sizes
+from pipelines.investigation.wanted_sizes import wanted_sizes
+from pipelines.mechanics.geometry import Geometry
+from pipelines.mechanics.kinematics import motion_table
+from pipelines.mechanics.machine import THE_LEG
+from pipelines.mechanics.motion import motion_from_table
+from pipelines.model import Term
+from pipelines.rig.plant import Plant
+from pipelines.rig.record import record
+from pipelines.settings.design import DesignSettings
+from pipelines.settings.filter import FilterSettings
+from pipelines.settings.rig.plant import PlantSettings
+
+QUICK = DesignSettings(harmonics=3, particles=12, iterations=50)
+RUNS = PlannedRuns(QUICK, PlantSettings())
+HIDDEN = "rotor_inertia@knee=0.05"
+
+
+@pytest.fixture(scope="module")
+def usual():
+    return design(QUICK).trajectory
+
+
+@pytest.fixture(scope="module")
+def before(usual):
+    return smallest_sizes(wanted_sizes([HIDDEN, "cogging@knee=0.5"], THE_LEG), RUNS, usual)
+
+
+@pytest.fixture(scope="module")
+def designed(before):
+    return sizes_design(before, RUNS, Geometry())
+
+
+def test_a_design_shows_a_size_that_the_usual_excitation_hides(before, designed):
+    assert before.shares()[0] < 0.9
+    assert np.all(designed.sizes.shares() > 0.97)
+    assert all(margin.kept for margin in designed.design.quality.margins)
+
+
+def test_its_metadata_say_what_it_shows_and_what_the_last_one_did(designed):
+    metadata = designed.metadata()
+    assert metadata["criterion"] == "sizes"
+    assert metadata["criterion_value"] == pytest.approx(designed.sizes.shares().min())
+    assert [row["cause"] for row in metadata["sizes"]] == ["rotor_inertia@knee", "cogging@knee"]
+    assert [row["shows"] for row in metadata["sizes_before"]] == [False, True]
+
+
+@pytest.mark.slow
+def test_equal_settings_give_an_equal_design(before, designed):
+    again = sizes_design(before, RUNS, Geometry()).design.trajectory
+    assert np.array_equal(again.a, designed.design.trajectory.a)
+
+
+@pytest.mark.slow
+def test_a_diagnosis_names_the_size_in_the_designed_excitation_only(usual, designed):
+    """Twice the size, as a plan knows neither the machine nor its noise."""
+    (one,) = wanted_sizes([HIDDEN], THE_LEG)
+    found = {}
+    for name, trajectory in (("usual", usual), ("designed", designed.design.trajectory)):
+        motions = []
+        for number, (run, purpose) in enumerate(
+            (run, purpose) for run in RUNS.kinds for purpose in ("train", "validate")
+        ):
+            hidden = [Term(one.effect, np.array([2.0 * one.size]))]
+            plant = Plant(PlantSettings(), run, seed=50 + number, effects=hidden)
+            table = Table(*record(plant, trajectory, 40.0, purpose))
+            motion = motion_from_table(motion_table(table, FilterSettings()))
+            motions.append(replace(motion, file=f"run_{number}.parquet"))
+        outcome = diagnose(motions)
+        found[name] = [cause.label for cause in outcome.causes]
+    assert found["designed"] == [one.label]
+
+
+@pytest.mark.parametrize(
+    ("texts", "message"),
+    [
+        (["cogging@knee"], "expected EFFECT@JOINT=SIZE with a size above 0"),
+        (["cogging@knee=-1"], "expected EFFECT@JOINT=SIZE with a size above 0"),
+        (["cogging@knee=nan"], "expected EFFECT@JOINT=SIZE with a size above 0"),
+        (["=1"], "expected EFFECT@JOINT=SIZE with a size above 0"),
+        (["cogging@knee=1", "cogging@knee=2"], "expected each cause once"),
+        (["friction@knee=1"], "expected a cause that `exoid effects` lists"),
+        (["cogging@elbow=1"], "expected cogging@hip or cogging@knee"),
+        ([], "found no cause"),
+    ],
+)
+def test_what_is_no_wanted_size_is_refused(texts, message):
+    with pytest.raises(InputError) as caught:
+        wanted_sizes(texts, THE_LEG)
+    assert message in str(caught.value) and "\n" not in str(caught.value)
+
+
+def test_a_cause_that_planned_runs_cannot_show_is_refused(usual):
+    wanted = wanted_sizes(["friction_temperature@knee=0.1"], THE_LEG)
+    with pytest.raises(InputError, match=r"friction_temperature@knee cannot show in planned runs"):
+        smallest_sizes(wanted, RUNS, usual)
