@@ -16,7 +16,7 @@ from pipelines.acquisition.encodings import (
 from pipelines.acquisition.leaps import sign_leap
 from pipelines.settings.rig import Register
 from pipelines.signals.cut_off import cut_off_at
-from pipelines.signals.folded import is_folded
+from pipelines.signals.folded import is_folded, is_folded_angle
 from pipelines.signals.held import are_held, new_values
 from pipelines.signals.leaping import leaps
 from pipelines.signals.rescaled import is_rescaled
@@ -82,6 +82,12 @@ def misread(quantity: str, register: Register, where: str, values: NDArray) -> I
         yield (
             "values turn round at 0 as those of a magnitude do, so that their sign is missing;"
             f" {remedy}"
+        )
+    elif quantity == "angle" and not register.turn and is_folded_angle(new - register.si[1]):
+        yield (
+            "values turn round at 0 as those of a magnitude do, so that their sign is missing; let"
+            f" the device write it, or set {where}.sign_bit. If the joint rebounds from a stop"
+            " there, they are right"
         )
 
 

@@ -4,10 +4,11 @@ from collections.abc import Iterator, Sequence
 from math import isclose
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pipelines.importing.channel import Channel
 from pipelines.importing.finding import Finding
-from pipelines.importing.naming.meaning import TWIN, meaning
+from pipelines.importing.naming.meaning import TWIN, derived, meaning
 from pipelines.importing.naming.unit_in_name import clock_unit_in, unit_in
 from pipelines.importing.quantities.conversion import columns_of
 from pipelines.importing.quantities.numbers import numbers
@@ -37,6 +38,7 @@ def contradictions(
     yield from _scaling(channels, source)
     yield from _other_units(channels, source)
     yield from _units_above(channels, source)
+    yield from _derived(channels, columns, source)
     yield from _other_units_of_clocks(channels, columns, time, source)
     if time.column is not None:
         yield from _clocks_in_the_same_rows(channels, columns, time, source)
@@ -78,6 +80,44 @@ def _with_unit(name: str, source: Source) -> str:
     """Return the name of a column, with the unit that the file has next to it."""
     plain, unit = TWIN.sub("", name), source.units.get(name)
     return f"{plain} [{unit}]" if unit else plain
+
+
+def _derived(channels: Sequence[Channel], columns: Columns, source: Source) -> Iterator[Finding]:
+    """Report changes of an angle, and sines or cosines of it, that the map has as the angle."""
+    for channel in channels:
+        name = channel.reading.column
+        if name is None or not channel.where.endswith(".angle"):
+            continue
+        action = "read as an angle, as the map says; log the angle itself"
+        if derived(source.column_named(name)):
+            yield Finding(
+                channel.target,
+                f"the name of {name!r} says a change from row to row, or a function of an angle",
+                action,
+            )
+        elif other := _other_leg(columns[name], source, columns):
+            seen = f"{name!r} and {other!r} are sine and cosine: their squares add to 1"
+            yield Finding(channel.target, seen, action)
+
+
+def _other_leg(values: NDArray, source: Source, columns: Columns) -> str | None:
+    """Return the column whose square, and that of values (n,), add to 1 in all rows, if any."""
+    # Largest part of the change of a square that noise and rounded digits leave in the sum.
+    share = 0.1
+    # Largest error of the sum itself.
+    tolerance = 0.01
+    rows = np.isfinite(values) if values.dtype.kind == "f" else np.zeros(0, dtype=bool)
+    square = values[rows] ** 2 if rows.any() else np.zeros(1)
+    if not 0.0 < np.max(square) <= 1.0 + tolerance:
+        return None
+    for name, raw in source.load([one for one in source.names if one not in columns]).items():
+        other = numbers(raw)
+        if len(other) != len(values):
+            continue
+        total = square + other[rows] ** 2
+        if np.std(total) < share * np.std(square) and abs(np.mean(total) - 1.0) < tolerance:
+            return name
+    return None
 
 
 def _other_units_of_clocks(

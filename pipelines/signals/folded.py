@@ -39,6 +39,22 @@ def is_folded(values: NDArray) -> bool:
     )
 
 
+def is_folded_angle(values: NDArray) -> bool:
+    """Return whether an angle turns round at zero as a magnitude does.
+
+    Parameters
+    ----------
+    values : (n,) array
+        New readings in a row, in any unit, zero where the angle is zero; NaN where missing.
+    """
+    known = values[np.isfinite(values)]
+    if len(known) < 2:
+        return False
+    # A counter that starts again at zero steps by its whole range there.
+    starts_again = np.max(np.abs(np.diff(known))) > 0.5 * np.ptp(known)
+    return not starts_again and is_folded(known)
+
+
 def _turns_round(values: NDArray) -> bool:
     """Return whether values (n,) turn round at zero as sharply as they came."""
     step = smallest_step(np.abs(values))

@@ -51,6 +51,15 @@ def test_digits_are_named_and_nothing_is_where_they_are_read_as_such(device, use
     assert decimal_keys(Register(address=0, **device), read(counts, device, device)) == {}
 
 
+def test_the_magnitude_of_an_angle_is_named():
+    """As of an inclinometer, whose tilt has no sign."""
+    register = Register(address=0, type="int16", scale=0.01)
+    angle = np.round(300 * SWING * np.cos(0.004 * np.arange(300)))
+    (text,) = misread("angle", register, "x", register.scale * np.abs(angle))
+    assert "set x.sign_bit" in text
+    assert not list(misread("angle", register, "x", register.scale * angle))
+
+
 @pytest.mark.parametrize("bits", [8, 12, 16])
 def test_a_gray_code_is_named_and_its_binary_values_are_not(bits):
     """As of an encoder on 16 inputs of a gateway; a joint that moves by a tenth of a turn."""

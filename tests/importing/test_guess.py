@@ -360,6 +360,8 @@ def test_a_log_in_which_nothing_moves_gets_no_guess(pendulum, write_csv, capsys)
 @pytest.mark.parametrize(
     ("name", "quantity", "joint", "unit"),
     [
+        ("q_dot", "velocity", "", None),
+        ("knee_theta_ddot", "acceleration", "knee", None),
         ("pos_meas1", "angle", "1", None),
         ("hip_angle_rad", "angle", "hip", "rad"),
         ("pivot.position", "angle", "pivot", None),
@@ -455,7 +457,11 @@ def test_counts_are_an_angle_where_nothing_else_is(guessed, pendulum, write_csv,
 
 
 @pytest.mark.parametrize(
-    "name", ["adc_counts", "torque_counts", "error_counts", "loop_ticks", "sample_count"]
+    "name",
+    [
+        *("adc_counts", "torque_counts", "error_counts", "loop_ticks", "sample_count"),
+        *("delta_counts", "enc_delta", "angle_delta_deg", "pos diff", "sin_theta"),
+    ],
 )
 def test_counts_of_something_else_are_no_angle(pendulum, write_csv, capsys, name):
     path = write_csv(

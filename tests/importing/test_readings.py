@@ -577,6 +577,45 @@ def test_a_torque_without_its_sign_is_named(imported, pendulum, write_csv):
     assert "its sign is missing" not in imported(write_csv(pendulum.columns())).printed
 
 
+def test_an_angle_without_its_sign_is_named(imported, pendulum, write_csv):
+    """As an inclinometer writes the magnitude of a tilt."""
+    outcome = imported(write_csv(pendulum.columns() | {"angle": np.abs(pendulum.angle)}))
+    assert outcome.code == 0
+    assert "pivot_angle_rad: turns round at 0 as a magnitude does" in outcome.printed
+    assert "its sign is missing" not in imported(write_csv(pendulum.columns())).printed
+
+
+@pytest.mark.parametrize("name", ["enc_delta", "d_theta", "pos increment", "sin_theta"])
+def test_a_name_that_says_no_angle_is_named(imported, pendulum, write_csv, name):
+    columns = pendulum.columns()
+    path = write_csv(columns | {name: columns.pop("angle")})
+    outcome = imported(path, map_text=MAP.replace('column = "angle"', f'column = "{name}"'))
+    assert outcome.code == 0, outcome.err
+    assert f"the name of {name!r} says a change from row to row" in outcome.printed
+
+
+@pytest.mark.parametrize("name", ["angle_D", "position", "theta_1", "cosmo_angle"])
+def test_a_name_that_may_be_of_an_angle_is_not(imported, pendulum, write_csv, name):
+    columns = pendulum.columns()
+    path = write_csv(columns | {name: columns.pop("angle")})
+    outcome = imported(path, map_text=MAP.replace('column = "angle"', f'column = "{name}"'))
+    assert outcome.code == 0, outcome.err
+    assert "read as an angle, as the map says" not in outcome.printed
+
+
+@pytest.mark.parametrize(
+    ("other", "is_named"), [(np.cos, True), (np.ones_like, False), (np.abs, False)]
+)
+def test_a_sine_next_to_its_cosine_is_named(imported, pendulum, write_csv, other, is_named):
+    """As a simulation logs what it observes, obs_0 and obs_1."""
+    angle = pendulum.angle
+    written = {"obs_0": np.round(other(angle), 6), "angle": np.round(np.sin(angle), 6)}
+    outcome = imported(write_csv(pendulum.columns() | written))
+    assert outcome.code == 0, outcome.err
+    expected = "pivot_angle_rad: 'angle' and 'obs_0' are sine and cosine"
+    assert (expected in outcome.printed) == is_named
+
+
 def test_a_torque_whose_decimal_point_moves_is_named(imported, pendulum, write_csv):
     torque = np.where(np.abs(pendulum.torque) < 0.5, 10.0 * pendulum.torque, pendulum.torque)
     printed = imported(write_csv(pendulum.columns() | {"torque": torque})).printed
@@ -695,6 +734,9 @@ def test_joints_that_are_one_are_named(imported, pendulum, write_csv, first, sec
         ("torque_daNm", 'unit = "N·m"', "the file says daNm of 'torque_daNm', the map N·m"),
         ("torque [N.mm/kg]", 'unit = "N.mm"', "the file says N.mm/kg"),
         ("torque ozf-in", 'unit = "N·m"', "the file says ozf-in"),
+        ("torque_Nm_per_kg", 'unit = "N·m"', "the file says Nm_per_kg"),
+        ("torque Nm/kg", 'unit = "N·m"', "the file says Nm/kg"),
+        ("torque_Nm_kg", 'unit = "N·m"', "the file says Nm_kg"),
         ("torque_gf", 'unit = "N·m"', ""),
         ("torque [0.1 Nm]", 'unit = "N·m"', "the file says 0.1 Nm"),
         ("torque [A]", 'unit = "N·m"', "the file says A of"),

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from pipelines.signals.folded import is_folded
+from pipelines.signals.folded import is_folded, is_folded_angle
 from tests.signals.torques import torque
 
 SEEDS = 100
@@ -75,3 +75,28 @@ def test_a_magnitude_with_the_sign_of_something_else_is_named(noise, sign):
 )
 def test_no_other_channel_is(channel):
     assert share(channel) <= 0.02
+
+
+@pytest.mark.parametrize("noise", [0.0, 1e-3])
+def test_the_magnitude_of_an_angle_is_named(noise):
+    def channel(rng):
+        angle = 0.1 * torque(rng, SECONDS)
+        return np.abs(angle + rng.normal(0.0, noise, len(angle)))
+
+    named = [is_folded_angle(channel(np.random.default_rng(seed))) for seed in range(SEEDS)]
+    assert np.mean(named) >= 0.8
+
+
+@pytest.mark.parametrize(
+    "channel",
+    [
+        lambda rng: 0.1 * torque(rng, SECONDS, 0.01),
+        lambda rng: np.round(torque(rng, SECONDS), 1) % 360.0,
+        lambda rng: np.zeros(0),
+        lambda rng: np.zeros(len(SECONDS)),
+    ],
+    ids=["with its sign", "starts again at zero", "no rows", "at rest"],
+)
+def test_an_angle_with_its_sign_is_not(channel):
+    named = [is_folded_angle(channel(np.random.default_rng(seed))) for seed in range(SEEDS)]
+    assert np.mean(named) <= 0.02

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipelines.importing.guess.torque import fit_torque
-from pipelines.importing.naming.meaning import RUNS, SIDES, STATISTICS, Meaning, in_counts
+from pipelines.importing.naming.meaning import RUNS, SIDES, STATISTICS, Meaning, derived, in_counts
 from pipelines.importing.quantities.consistency import integral_agreement, likeliest_integrals
 from pipelines.importing.quantities.numbers import are_whole
 from pipelines.settings.units import UNITS
@@ -307,7 +307,7 @@ def _pairs(
     usable: Sequence[Meaning], columns: Mapping[str, NDArray], time_s: NDArray
 ) -> list[tuple[Meaning, Meaning]]:
     """Return the pairs of columns that are likeliest angle and velocity."""
-    angles = [m for m in usable if not m.quantity]
+    angles = [m for m in usable if not (m.quantity or derived(m.column))]
     velocities = [m for m in usable if m.quantity in ("", "velocity")]
     logged = ([_float(columns, m) for m in members] for members in (angles, velocities))
     pairs = [(angles[i], velocities[j]) for i, j in likeliest_integrals(time_s, *logged)]

@@ -23,9 +23,9 @@ WORDS: dict[str, frozenset[str]] = {
     quantity: _words(words)
     for quantity, words in {
         "time": "time t stamp timestamp timestamps clock zeit uhrzeit zeitstempel temps horodatage",
-        "acceleration": "acc accel acceleration ddq qdd beschleunigung beschl",
+        "acceleration": "acc accel acceleration ddq qdd ddot dotdot beschleunigung beschl",
         "velocity": (
-            "vel velo velocity speed omega dq qd qdot dtheta thetadot drehzahl geschwindigkeit"
+            "vel velo velocity speed omega dq qd qdot dot dtheta thetadot drehzahl geschwindigkeit"
             " geschw vitesse"
         ),
         "torque": "tau torque trq tq effort moment drehmoment couple",
@@ -61,6 +61,11 @@ SOMETHING_ELSE = _words(
     " nummer zustand modus zwischenkreis batterie versorgung ecart erreur etat"
 )
 """Words that change the meaning of a torque or a position."""
+DERIVED = _words(
+    "delta deltas diff difference differences increment increments differenz inkrement"
+    " sin cos tan sine cosine sinus cosinus kosinus"
+)
+"""Words of a change from row to row, or of a function of an angle."""
 TALLIES = _words(
     "adc dac pwm tick cycle loop step sample frame packet message msg rx tx timer sys system cpu"
     " index fifo buffer queue missed lost dropped crc zyklus takt"
@@ -154,7 +159,7 @@ def meaning(name: str) -> Meaning:
         words = [word for word in words if word not in SIGNS]
     commanded = bool(distinct & COMMANDED)
     # The current i_d along the rotor's field makes no torque; i_q across it does.
-    if distinct & SOMETHING_ELSE or {"i", "d"} <= distinct:
+    if distinct & (SOMETHING_ELSE | DERIVED) or {"i", "d"} <= distinct:
         quantity = ""
     elif distinct & ENABLED or ("on" in distinct and distinct & SWITCHED):
         quantity = "enabled"
@@ -184,13 +189,19 @@ def _containers(name: str) -> set[str]:
     return set(words_of(outer)) & {"state", "status"} - set(words_of(inner))
 
 
+def derived(name: str) -> bool:
+    """Return whether a name says a change from row to row, or a function, of an angle."""
+    # A capital D may be the fourth of several joints.
+    return bool(DERIVED & set(words_of(name))) or re.match(r"d_|[Δ∆]", name) is not None
+
+
 def in_counts(column: Meaning) -> Meaning | None:
     """Return a column as an angle if its name has a unit of counts and no other meaning."""
     in_name = unit_in(TWIN.sub("", column.column))
     if column.quantity or in_name is None or in_name.unit != "counts":
         return None
     words = [word for word in words_of(in_name.rest) if word not in SIGNS]
-    if set(words) & (SOMETHING_ELSE | TALLIES) or _quantity(set(words)):
+    if set(words) & (SOMETHING_ELSE | DERIVED | TALLIES) or _quantity(set(words)):
         return None
     return replace(column, quantity="angle", joint=_joint(words), unit="counts")
 

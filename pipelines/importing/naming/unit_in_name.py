@@ -177,6 +177,14 @@ def _outside_of_brackets(name: str) -> UnitInName | None:
     # The last one, because a unit follows what it is of.
     last = matches[-1]
     unit = _written(last[0])
+    if len(matches) > 1 and unit is None:
+        # A torque for each kilogram of a person, as Nm_per_kg, is no mass.
+        first = matches[-2]
+        between = name[first.end() : last.start()]
+        if re.fullmatch(r"[\s_]*(?:per|[/·*_]|)[\s_]*", between):
+            rest = f"{name[: first.start()]} {name[last.end() :]}"
+            text = name[first.start() : last.end()]
+            return UnitInName(rest, None, decides=True, unread=text)
     decides = last.re is _WORD and (unit is None or _is_plain(last[0], unit))
     doubt = GRAD if last[0].startswith("grad") and unit in ("deg", "deg/s") else ""
     return UnitInName(_without(name, last), unit, decides, doubt=doubt)

@@ -17,7 +17,7 @@ from pipelines.mechanics.machine import known_in_words, machine_of, mechanisms_o
 from pipelines.mechanics.remedies import AT_REST
 from pipelines.settings.import_map import ImportMap, JointSettings
 from pipelines.signals.cut_off import cut_off_at
-from pipelines.signals.folded import is_folded
+from pipelines.signals.folded import is_folded, is_folded_angle
 from pipelines.signals.held import new_values
 from pipelines.signals.leaping import leaps
 from pipelines.signals.power import absorbed_w
@@ -72,6 +72,7 @@ def check(columns: Mapping[str, NDArray], settings: ImportMap) -> Iterator[Findi
         yield from _turns_on(columns, joint)
         yield from _slips(columns, joint)
         yield from _leaps(columns, joint)
+        yield from _without_sign(columns, joint)
         yield from _too_strong(columns, joint)
         for quantity in _torque_of(joint):
             name = joint.joint.column(quantity)
@@ -181,6 +182,19 @@ def _leaps(columns: Mapping[str, NDArray], joint: JointSettings) -> Iterator[Fin
         action = (
             "kept; rows there may be of two records, in another order, or repeat an old value:"
             " divide the log there with span_s"
+        )
+        yield Finding(name, seen, action)
+
+
+def _without_sign(columns: Mapping[str, NDArray], joint: JointSettings) -> Iterator[Finding]:
+    """Report an angle that turns round at 0, as an inclinometer's magnitude."""
+    name = joint.joint.column("angle")
+    values = columns[name][new_values(columns[name])]
+    if joint.kind == "revolute" and is_folded_angle(values):
+        seen = "turns round at 0 as a magnitude does, so its sign is missing"
+        action = (
+            "kept; where another column has it, let an expression multiply both. If the joint"
+            " rebounds from a stop there, it is right"
         )
         yield Finding(name, seen, action)
 
