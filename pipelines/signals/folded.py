@@ -20,7 +20,8 @@ It is halfway between all of them, as of a magnitude, and the half at which valu
 smoothly seem to do so.
 """
 LENGTHS = (1, 2, 4, 8)
-"""Rows whose means are judged: more of them have less noise, and fewer a sharper turn."""
+"""Rows whose means are judged: more of them have less noise, and fewer a sharper turn. All of them
+count together."""
 
 
 def is_folded(values: NDArray) -> bool:
@@ -32,11 +33,16 @@ def is_folded(values: NDArray) -> bool:
         New readings in a row, in any unit, zero where the quantity is zero; NaN where missing.
     """
     known = values[np.isfinite(values)]
-    lengths = (length for length in LENGTHS if len(known) >= 3 * length)
-    return any(
-        _turns_round(known[: len(known) // length * length].reshape(-1, length).mean(axis=1))
-        for length in lengths
+    # Where means of many rows do not resolve a turn, single rows go through zero.
+    turned = np.concatenate(
+        [
+            _turned(known[: len(known) // length * length].reshape(-1, length).mean(axis=1))
+            for length in LENGTHS
+            if len(known) >= 4 * length
+        ]
+        or [np.zeros(0, dtype=bool)]
     )
+    return bool(len(turned) >= CROSSINGS and np.mean(turned) >= SHARE)
 
 
 def is_folded_angle(values: NDArray) -> bool:
@@ -55,16 +61,17 @@ def is_folded_angle(values: NDArray) -> bool:
     return not starts_again and is_folded(known)
 
 
-def _turns_round(values: NDArray) -> bool:
-    """Return whether values (n,) turn round at zero as sharply as they came."""
+def _turned(values: NDArray) -> NDArray:
+    """Return for each crossing that values (n,) come to whether they turn round there instead."""
     step = smallest_step(np.abs(values))
-    ahead = 2.0 * values[1:-1] - values[:-2]
+    before, here, after = values[1:-2], values[2:-1], values[3:]
+    ahead = 2.0 * here - before
     # Noise and the smallest step let values turn round without any crossing.
-    noise = float(np.median(np.abs(values[2:] - ahead)))
+    noise = float(np.median(np.abs(after - ahead)))
     # As if all came from above.
-    side = np.sign(values[1:-1])
-    ahead, after = side * ahead, side * values[2:]
-    crosses = ahead < -2.0 * max(step, noise)
-    far, came = -ahead[crosses], after[crosses]
-    goes_on = came > 0.5 * far
-    return bool(len(far) >= CROSSINGS and np.mean(goes_on) >= SHARE)
+    side = np.sign(here)
+    ahead, after = side * ahead, side * after
+    # A spike to zero and back turns round, too, but did not come on a straight line.
+    came_straight = np.abs(values[:-3] - 2.0 * before + here) < 0.7 * np.abs(here - before)
+    crosses = (ahead < -2.0 * max(step, noise)) & came_straight
+    return np.asarray(after[crosses] > -0.5 * ahead[crosses])

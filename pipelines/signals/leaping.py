@@ -7,6 +7,8 @@ by its rows has no single step far longer than all others.
 import numpy as np
 from numpy.typing import NDArray
 
+from pipelines.signals.resolution import smallest_step
+
 MOST = 10
 """Greatest number of leaps; more are the steps of a coarse or slowly sampled reading."""
 FAR = 4.0
@@ -33,6 +35,9 @@ def leaps(time_s: NDArray, values: NDArray) -> NDArray:
     if not len(falls):
         return np.array([], dtype=np.intp)
     first = np.sort(order[: falls[-1] + 1])
+    # A joint at rest that flickers by a count does not leap, however fast that is.
+    if steps[first].min() < FAR * smallest_step(values[known]):
+        return np.array([], dtype=np.intp)
     # A joint that is moved from stop to stop within a row leaps, too, but does nothing else.
     if steps[first].sum() > np.delete(steps, first).sum():
         return np.array([], dtype=np.intp)

@@ -62,15 +62,17 @@ def test_a_magnitude_with_the_sign_of_something_else_is_named(noise, sign):
         lambda rng: touching(rng, 0.05),
         lambda rng: touching(rng, 0.5),
         lambda rng: np.maximum(np.round(rng.normal(0.3, 0.5, len(SECONDS))), 0.0),
+        lambda rng: np.where(rng.random(len(SECONDS)) < 0.1, 0.01, torque(rng, SECONDS, 0.05)),
         lambda rng: 10.0 * (np.sin(rng.uniform(10.0, 60.0) * SECONDS) > 0.0),
         lambda rng: np.zeros(0),
+        lambda rng: torque(rng, SECONDS[: rng.integers(1, 40)], 0.05),
         lambda rng: np.zeros(len(SECONDS)),
     ],
     ids=[
         *("with its sign", "with friction", "with much friction", "mostly noise", "coarse"),
         *("a random walk", "above zero", "cut off at zero", "cut off, noisy"),
         *("touching zero", "touching, some noise", "touching, noisy", "coarse at rest"),
-        *("pulses", "no rows", "all zero"),
+        *("spikes to zero", "pulses", "no rows", "few rows", "all zero"),
     ],
 )
 def test_no_other_channel_is(channel):
@@ -93,6 +95,7 @@ def test_the_magnitude_of_an_angle_is_named(noise):
         lambda rng: 0.1 * torque(rng, SECONDS, 0.01),
         lambda rng: np.round(torque(rng, SECONDS), 1) % 360.0,
         lambda rng: np.zeros(0),
+        lambda rng: torque(rng, SECONDS[: rng.integers(1, 40)], 0.05),
         lambda rng: np.zeros(len(SECONDS)),
     ],
     ids=["with its sign", "starts again at zero", "no rows", "at rest"],

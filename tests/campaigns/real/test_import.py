@@ -126,3 +126,20 @@ def test_a_guess_of_the_xl330_asks_for_its_torque_constant(real_data, tmp_path, 
         text.replace("# torque_constant_nm_a =", "torque_constant_nm_a = 0.59 #")
     )
     assert run(["import", file, "--map", str(tmp_path / "guess.toml"), "-o", str(tmp_path)]) == 0
+
+
+@pytest.mark.parametrize(
+    ("pattern", "map_name"),
+    [
+        ("emps/*.mat", "emps.toml"),
+        ("double_pendulum/A0_fourier_75s.csv", "double_pendulum_fourier.toml"),
+        ("double_pendulum/A0_swing_*.csv", "double_pendulum.toml"),
+        ("double_pendulum/C1*.csv", "double_pendulum_C1.toml"),
+        ("simple_pendulum/*.csv", "simple_pendulum.toml"),
+        ("xl330/*.json", "xl330.toml"),
+    ],
+)
+def test_no_channel_of_a_sound_log_is_taken_for_a_magnitude_or_leaps(imported, pattern, map_name):
+    _, messages = imported(pattern, map_name)
+    assert "turns round" not in messages
+    assert "leaps" not in messages
