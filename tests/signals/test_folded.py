@@ -98,7 +98,7 @@ def test_the_magnitude_of_an_angle_is_named(noise):
         lambda rng: torque(rng, SECONDS[: rng.integers(1, 40)], 0.05),
         lambda rng: np.zeros(len(SECONDS)),
     ],
-    ids=["with its sign", "starts again at zero", "no rows", "at rest"],
+    ids=["with its sign", "starts again at zero", "no rows", "few rows", "at rest"],
 )
 def test_an_angle_with_its_sign_is_not(channel):
     named = [is_folded_angle(channel(np.random.default_rng(seed))) for seed in range(SEEDS)]
