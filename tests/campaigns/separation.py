@@ -16,7 +16,7 @@ from pipelines.contracts.table import Table
 from pipelines.design.excitation import design
 from pipelines.diagnosis.diagnose import diagnose
 from pipelines.diagnosis.verdict.verdict import verdict
-from pipelines.effects import EFFECTS
+from pipelines.effects import EFFECTS, Effect
 from pipelines.errors import NotIdentifiable
 from pipelines.investigation.planned import PlannedRuns
 from pipelines.investigation.rivals import Rival, sized
@@ -39,17 +39,20 @@ UNDECIDED = 0.5
 """Share of predicted experiments that decide, up to which a pair is drawn."""
 
 
-def undecided_pairs(usual: Trajectory) -> Iterator[tuple[Rival, Rival]]:
-    """Yield pairs of causes that the usual excitation leaves undecided, but another may not."""
+def plain_effects() -> list[Effect]:
+    """Return the causes at each joint that have the same values in each run."""
     effects = [
         one(joint=joint, on=THE_LEG)
         for one in EFFECTS
         if one.name not in BASELINE and not one.needs_temperature
         for joint in one.possible(THE_LEG)
     ]
-    # Hidden effects have the same values in each run.
-    plain = [e for e in effects if not e.per_run and not any(p.per_run for p in e.linear)]
-    for one, other in itertools.combinations(plain, 2):
+    return [e for e in effects if not e.per_run and not any(p.per_run for p in e.linear)]
+
+
+def undecided_pairs(usual: Trajectory) -> Iterator[tuple[Rival, Rival]]:
+    """Yield pairs of causes that the usual excitation leaves undecided, but another may not."""
+    for one, other in itertools.combinations(plain_effects(), 2):
         rivals = (Rival(one, 0.5), Rival(other, 0.5))
         separated = separation_of_last(rivals, RUNS, usual)
         if min(separated.as_json()["decided"]) < UNDECIDED and not separated.inseparable():

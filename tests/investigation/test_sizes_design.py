@@ -25,7 +25,7 @@ from pipelines.settings.rig.plant import PlantSettings
 
 QUICK = DesignSettings(harmonics=3, particles=12, iterations=50)
 RUNS = PlannedRuns(QUICK, PlantSettings())
-HIDDEN = "rotor_inertia@knee=0.05"
+HIDDEN = "rotor_inertia@knee=0.1"
 
 
 @pytest.fixture(scope="module")
