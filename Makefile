@@ -20,7 +20,7 @@ SESSIONS ?= 2000
 
 .DEFAULT_GOAL := help
 .PHONY: help all test test-slow invariants mutation readability check format bench estimators real fuzz vetoes blind blind-full blind-machines blind-fixed blind-page
-.PHONY: separation evidence learn cross-validation sensitivity docs lock clean install
+.PHONY: detectability separation evidence learn cross-validation sensitivity docs lock clean install
 
 help: ## this list
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*##/\t/' | sort | expand -t 12
@@ -83,6 +83,9 @@ blind-machines: $(INSTALLED) ## the same on 200 machines of one joint
 
 blind-fixed: $(INSTALLED) ## record anew how the fixed set of CI comes out, in tests/campaigns/blind/fixed_set.json
 	$(BIN)/python -m tests.campaigns.blind --fixed --write --out build/blind-fixed
+
+detectability: $(INSTALLED) ## does a diagnosis name causes of the sizes that `exoid detect` predicts? Twelve causes, ten minutes
+	$(BIN)/python -m tests.campaigns.detectability
 
 separation: $(INSTALLED) ## do excitations of `exoid design --separate` decide as predicted? Twelve pairs of causes, half an hour
 	$(BIN)/python -m tests.campaigns.separation

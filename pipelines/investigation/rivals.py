@@ -17,8 +17,8 @@ from pipelines.diagnosis.detectability.shapes import shapes_of
 from pipelines.effects import Effect
 from pipelines.errors import InputError, about
 from pipelines.mechanics.machine import Machine
-from pipelines.model import BASELINE, Term, term_from
-from pipelines.wording.label import effect_at
+from pipelines.model import Term, term_from
+from pipelines.wording.label import cause_at
 
 SETTING = "--separate"
 
@@ -110,7 +110,7 @@ def rivals_named(labels: Sequence[str], machine: Machine) -> list[Rival]:
             f"{SETTING}: found {', '.join(labels) or 'no cause'}, expected two different causes or"
             " more, each as EFFECT@JOINT; `exoid effects` lists them"
         )
-    effects = [effect_at(label, machine, _is_cause, SETTING) for label in labels]
+    effects = [cause_at(label, machine, SETTING) for label in labels]
     return [Rival(effect, 1.0 / len(effects)) for effect in effects]
 
 
@@ -148,16 +148,12 @@ def rivals_in_verdict(folder: Path, machine: Machine) -> list[Rival]:
     }
     rivals = []
     for one in open_ones:
-        effect = effect_at(one.label, machine, _is_cause, str(folder))
+        effect = cause_at(one.label, machine, str(folder))
         values = fitted.get(one.label)
         with about(folder / "verdict.json"):
             term = term_from(effect, values) if values else None
         rivals.append(Rival(term.effect if term else effect, one.probability / total, term))
     return rivals
-
-
-def _is_cause(effect: type[Effect]) -> bool:
-    return effect.name not in BASELINE
 
 
 def sized(rivals: Sequence[Rival], problem: DetectionProblem) -> list[SizedRival]:

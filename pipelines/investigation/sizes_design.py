@@ -13,10 +13,12 @@ import numpy as np
 from pipelines.design.excitation import Design
 from pipelines.design.quality import quality
 from pipelines.design.search import Report
+from pipelines.diagnosis.detectability.detection_problem import DetectionProblem
 from pipelines.errors import InputError
 from pipelines.investigation.planned import PlannedRuns
 from pipelines.investigation.polished_search import polished_search
 from pipelines.investigation.wanted_sizes import SETTING, SmallestSizes, WantedSize
+from pipelines.mechanics.fourier import FourierTrajectory
 from pipelines.mechanics.geometry import Geometry
 from pipelines.mechanics.trajectory import Trajectory
 
@@ -50,7 +52,7 @@ def smallest_sizes(
     InputError
         Where such runs cannot show one of them at all.
     """
-    problem = runs.problem(trajectory, [one.effect for one in wanted])
+    problem = _problem(wanted, runs, trajectory)
     motions = [run.motion for run in problem.runs]
     for one in wanted:
         if not one.effect.shows_in(motions):
@@ -59,6 +61,12 @@ def smallest_sizes(
                 " leave it out"
             )
     return SmallestSizes.of(wanted, problem)
+
+
+def _problem(
+    wanted: Sequence[WantedSize], runs: PlannedRuns, trajectory: Trajectory
+) -> DetectionProblem:
+    return runs.problem(trajectory, [one.effect for one in wanted])
 
 
 def sizes_design(
@@ -82,18 +90,34 @@ def sizes_design(
     report : callable, optional
         Called with the share that is done, 0 to 1, and a note.
     """
+    settings, found, sizes = runs.settings, [], before
+    # The background takes another share in the new motion, for which it is searched again.
+    for start in (0.0, 0.5):
+
+        def report_part(done: float, note: str, start: float = start) -> None:
+            report(start + 0.5 * done, note)
+
+        trajectory, stopped_by = _search(sizes, runs, geometry, report_part)
+        sizes = smallest_sizes(before.wanted, runs, trajectory)
+        design = Design(trajectory, quality(trajectory, settings, geometry), settings, stopped_by)
+        found.append(SizesDesign(design, sizes, before))
+    return max(found, key=lambda one: float(one.sizes.shares().min()))
+
+
+def _search(
+    sizes: SmallestSizes, runs: PlannedRuns, geometry: Geometry, report: Report
+) -> tuple[FourierTrajectory, str]:
+    """Return the best excitation with the growth of some sizes, and what ended the search."""
     best = 0.0
 
     def cost(trajectory: Trajectory, log_det: float) -> tuple[float, str]:
         nonlocal best
-        shares = smallest_sizes(before.wanted, runs, trajectory).shares()
+        problem = _problem(sizes.wanted, runs, trajectory)
+        shares = SmallestSizes.by_noise(sizes.wanted, problem, sizes.growth).shares()
         best = max(best, float(shares.min()))
         return _cost(shares, log_det), f"least wanted size {best:.3g} of the smallest"
 
-    trajectory, stopped_by = polished_search(runs.settings, geometry, cost, report, least_gain=3e-3)
-    settings = runs.settings
-    design = Design(trajectory, quality(trajectory, settings, geometry), settings, stopped_by)
-    return SizesDesign(design, smallest_sizes(before.wanted, runs, trajectory), before)
+    return polished_search(runs.settings, geometry, cost, report, least_gain=3e-3)
 
 
 def _cost(shares: np.ndarray, log_det: float) -> float:

@@ -7,7 +7,7 @@ from pipelines.contracts.joints import the
 from pipelines.effects import EFFECTS, Effect
 from pipelines.errors import InputError, about
 from pipelines.mechanics.machine import Machine
-from pipelines.model import effect_named
+from pipelines.model import BASELINE, effect_named
 from pipelines.wording.law import LAW, law_in_words
 
 if TYPE_CHECKING:
@@ -54,13 +54,28 @@ def effect_at(
     expected = [one.label for one in can_be if one.name == effect.name] or [
         one.label for one in can_be
     ]
-    # More than a line holds.
-    if len(expected) > 8:
-        expected = ["a cause that `exoid effects` lists"]
     raise InputError(
         f"{setting}: found {label}, expected {' or '.join(expected) or 'nothing'}"
         f"{f' ({why})' if why else ''}; correct it or leave it out"
     )
+
+
+def cause_at(label: str, machine: Machine, setting: str) -> Effect:
+    """Return the effect of a label at a machine, if a diagnosis could name it as a cause.
+
+    Raises
+    ------
+    InputError
+        Where there is none of this name or at this joint, or every model has it.
+    """
+    with about(setting):
+        effect = effect_labelled(label)
+    if effect.name in BASELINE:
+        raise InputError(
+            f"{setting}: found {label}, which every model has; name a cause that `exoid effects`"
+            " lists"
+        )
+    return effect_at(label, machine, lambda kind: True, setting)
 
 
 def effect_of_cause(cause: "Cause | Tie") -> Effect:

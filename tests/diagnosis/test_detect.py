@@ -71,7 +71,7 @@ def rows_of(parts, runs, root):
     "label", ["coulomb_asymmetry@knee", "rotor_inertia@knee", "quadratic_drag@hip"]
 )
 def test_an_effect_of_the_smallest_size_is_found_as_often_as_promised(label):
-    rms = np.array([2.0, 1.5])  # large enough that noise, not materiality, sets the size
+    rms = np.array([2.0, 1.5])  # large enough that noise, not background, sets the size
     share = (1 - SLOW) / (1 + SLOW)
     runs = runs_on(RICH, ("exo_alone",))
     baseline = baseline_of(runs)
@@ -114,17 +114,17 @@ def test_the_needed_noncentrality_is_the_square_of_two_quantiles():
 def test_where_anything_would_show_an_effect_must_be_some_times_what_a_good_rig_has():
     runs = 3 * runs_on(RICH)
     smallest = []
-    for rms in (0.05, 0.025):
+    for rms in (0.01, 0.005):
         floor = Floor(np.array([rms, rms, np.nan, np.nan]), np.ones(4), from_periods=False)
         smallest += [
             d
             for d in detectability(runs, baseline_of(runs), floor)
             if d.effect.label == "quadratic_drag@knee"
         ]
-    assert [one.limited_by for one in smallest] == ["materiality"] * 2
+    assert [one.limited_by for one in smallest] == ["background"] * 2
     loud, quiet = (one.smallest_rms_nm / one.torque_rms_nm for one in smallest)
     assert 2.0 * CRITERIA.background_cause < loud < 8.0 * CRITERIA.background_cause
-    assert quiet == pytest.approx(loud, rel=1e-3), "half the noise shows none that is smaller"
+    assert quiet == pytest.approx(loud, rel=0.01), "half the noise shows none that is smaller"
 
 
 @pytest.mark.parametrize(
@@ -165,7 +165,9 @@ def test_a_single_sine_hides_a_spring_that_a_rich_motion_shows(rich):
 
 def test_twice_the_noise_hides_effects_twice_as_large():
     floor = planned_noise(NOISE, 200.0, BlockAverage(5))
-    loud, louder = (looked_at(RICH, replace(floor, rms=times * floor.rms)) for times in (5.0, 10.0))
+    loud, louder = (
+        looked_at(RICH, replace(floor, rms=times * floor.rms)) for times in (40.0, 80.0)
+    )
     for label in ("viscous_asymmetry@knee", "cogging@hip", "encoder_offset@hip"):
         assert loud[label].limited_by == louder[label].limited_by == "noise"
         assert louder[label].smallest_rms_nm == pytest.approx(
@@ -186,6 +188,13 @@ def test_planned_noise_is_what_block_averages_of_coloured_noise_have():
 
 def test_what_a_motion_shows_at_no_size_is_like_nothing_that_it_shows():
     unseen = DetectionResult(
-        (), np.inf, np.inf, "exo_alone", np.inf, *[np.zeros((0, 0))] * 3, plausible=False
+        (),
+        np.inf,
+        np.inf,
+        "noise",
+        np.inf,
+        *[np.zeros((0, 0))] * 3,
+        plausible=False,
+        candidate=None,
     )
     assert not _alike(unseen, np.array([0.0, 0.5, 1.0])).any()

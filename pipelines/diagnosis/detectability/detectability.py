@@ -10,10 +10,11 @@ for each amplitude. So
     theta_min = (z_a + z_b) / |(I - P) c|
 
 with z_a^2 twice the price and z_b for the required power. A good rig shows a little of every cause
-(``Criteria.background_cause``), so the smallest size also exceeds that by as much.
+(``Criteria.background_cause``). As in a diagnosis, that is noise, too: the part of (I - P) c that
+the causes' columns explain together counts less.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
 
@@ -71,8 +72,8 @@ class Detectable:
     best_rms_nm: float
     """The same rms at the shape that is easiest to detect."""
     limited_by: str
-    """``noise``, or ``materiality`` where a smaller effect is detectable but too small to
-    matter."""
+    """``noise``, or ``background`` where most of what noise leaves of it resembles what a good rig
+    has of all causes."""
     tied_with: tuple[str, ...]
     """Causes that cannot be separated from this one at its smallest size."""
     never_apart: tuple[str, ...]
@@ -138,6 +139,19 @@ class DetectionResult:
     plausible: bool
     """Whether typical sizes of this shape make a torque that is not zero and that a joint can
     have."""
+    candidate: Candidate
+
+    def behind(self, problem: DetectionProblem, power: float) -> "DetectionResult":
+        """Return the result behind the background of a good rig, by which a size grows."""
+        if not np.isfinite(self.size):
+            return self
+        share = problem.shown(self.remainder)
+        # Most of what noise leaves of it may be background.
+        by = "noise" if share > 0.5 else "background"
+        if self.candidate.transforms_motion:
+            return replace(_bent(self.candidate, problem, power), by=by)
+        growth = float(np.sqrt(1.0 / share))
+        return replace(self, size=growth * self.size, rms=growth * self.rms, by=by)
 
 
 def detectability(
@@ -167,17 +181,8 @@ def detectability(
     list of Detectable
     """
     problem = DetectionProblem.of([at_block_rate(run) for run in runs], baseline, floor)
-    # An effect that the wearer may carry has the same name; the machine's is reported.
-    motions = [run.motion for run in runs]
-    effects = [
-        e
-        for e in proposals(baseline, baseline.kinds)
-        if e.run is None and not e.each_run and e.shows_in(motions)
-    ]
-    results: dict[Effect, list[DetectionResult]] = {}
-    for number, effect in enumerate(effects):
-        report(number / len(effects), effect.label)
-        results[effect] = at_each_shape(effect, problem, power)
+    results = of_all_causes(problem, power, report)
+    effects = list(results)
     chosen = [usual(own) for own in results.values()]
     unexplained = _unexplained(chosen, list(results.values()))
     return [
@@ -186,14 +191,47 @@ def detectability(
     ]
 
 
+def of_all_causes(
+    problem: DetectionProblem, power: float, report: Report = silent
+) -> dict[Effect, list[DetectionResult]]:
+    """Return the smallest size of each cause at each plausible shape, behind the background."""
+    # An effect that the wearer may carry has the same name; the machine's is reported.
+    motions = [run.motion for run in problem.runs]
+    effects = [
+        e
+        for e in proposals(problem.baseline, problem.baseline.kinds)
+        if e.run is None and not e.each_run and e.shows_in(motions)
+    ]
+    results: dict[Effect, list[DetectionResult]] = {}
+    for number, effect in enumerate(effects):
+        report(number / len(effects), effect.label)
+        results[effect] = at_each_shape(effect, problem, power)
+    problem = with_background(problem, {e: usual(own) for e, own in results.items()})
+    return {e: [one.behind(problem, power) for one in own] for e, own in results.items()}
+
+
 def at_each_shape(effect: Effect, problem: DetectionProblem, power: float) -> list[DetectionResult]:
-    """Return the smallest size of an effect at each plausible shape."""
+    """Return the smallest size of an effect at each plausible shape, by noise alone."""
     of_shapes = [
         (_bent if candidate.transforms_motion else _added)(candidate, problem, power)
         for candidate in shapes_of(effect, problem.runs)
     ]
     # Where no shape is plausible, all count: every cause is reported.
     return [one for one in of_shapes if one.plausible] or of_shapes
+
+
+def with_background(
+    problem: DetectionProblem, results: Mapping[Effect, DetectionResult]
+) -> DetectionProblem:
+    """Return the problem with the background of a good rig, each cause at one shape."""
+    columns = []
+    for effect, one in results.items():
+        if np.isfinite(one.size):
+            at_smallest = np.sqrt(one.noncentrality) * one.remainder
+            torque = float(problem.torque_rms[problem.joint(effect)])
+            columns.append(CRITERIA.background_cause * torque / one.rms * at_smallest)
+    background = np.array(columns).T if columns else problem.background
+    return replace(problem, background=background)
 
 
 def usual(results: Sequence[DetectionResult]) -> DetectionResult:
@@ -277,7 +315,7 @@ def _added(candidate: Candidate, problem: DetectionProblem, power: float) -> Det
     own = candidate.columns_in([run.motion.run for run in problem.runs])
     span = problem.remainder([own.expand(column, r) for r, column in enumerate(columns)])
     remainder = problem.remainder(direction)[:, 0]
-    growth, by = _growth(effect, remainder, direction, span.shape[1], problem, power)
+    growth = _growth(remainder, direction, span.shape[1], problem, power)
     size, unit = float(np.sqrt(growth)), problem.rms(effect, direction)
     least, largest = np.sort(np.abs(effect.linear[0].typical))
     # A range of both signs includes zero, so there is no least size.
@@ -292,12 +330,13 @@ def _added(candidate: Candidate, problem: DetectionProblem, power: float) -> Det
         candidate.shapes[0],
         size,
         size * unit if np.isfinite(size) else np.inf,
-        by,
+        "noise",
         squared(remainder) * growth if np.isfinite(growth) else np.inf,
         unit_vector(remainder),
         orthonormal(span),
         orthonormal(problem.remainder(level)),
         least * unit < torque and largest * unit > least_share * torque,
+        candidate,
     )
 
 
@@ -310,13 +349,13 @@ def _bent(candidate: Candidate, problem: DetectionProblem, power: float) -> Dete
     )
     reach = float(np.linalg.norm(start - zero))
 
-    def at(x: float) -> tuple[float, str, NDArray, list[NDArray], float]:
+    def at(x: float) -> tuple[float, NDArray, list[NDArray], float]:
         # Sizes span decades, so the search is over their logarithm.
         shape = zero + (start - zero) / reach * np.exp(x)
         column = bend(replace(candidate, shapes=(tuple(shape),) * len(problem.runs)), problem)
         remainder = problem.remainder(column)[:, 0]
-        growth, by = _growth(effect, remainder, column, 1, problem, power)
-        return growth, by, remainder, column, float(effect.physical(effect.completed(shape))[0])
+        growth = _growth(remainder, column, 1, problem, power)
+        return growth, remainder, column, float(effect.physical(effect.completed(shape))[0])
 
     x0 = float(np.log(reach))
     x1 = x0 - np.log(1.5)
@@ -331,47 +370,37 @@ def _bent(candidate: Candidate, problem: DetectionProblem, power: float) -> Dete
         # The effect is not proportional to its size, so a step is at most a factor of e².
         x0, x1 = x1, x1 - float(np.clip(np.log(now[0]) / slope, -2.0, 2.0))
         before, now = now, at(x1)
-    growth, by, remainder, column, value = now
+    growth, remainder, column, value = now
     # A growth of one means that this very size is just named.
     seen = np.isfinite(growth) and abs(np.log(growth)) < 0.2
     return DetectionResult(
         (),
         value if seen else np.inf,
         problem.rms(effect, column) if seen else np.inf,
-        by,
-        squared(remainder) if seen else np.inf,
+        "noise",
+        problem.shown(remainder) if seen else np.inf,
         unit_vector(remainder),
         orthonormal(remainder[:, np.newaxis]),
         np.zeros((len(remainder), 0)),
         plausible=True,
+        candidate=candidate,
     )
 
 
 def _growth(
-    effect: Effect,
     remainder: NDArray,
     column: Sequence[NDArray],
     columns: int,
     problem: DetectionProblem,
     power: float,
-) -> tuple[float, str]:
-    """Return the factor by which an effect's square must grow to be named, and its limit."""
+) -> float:
+    """Return the factor by which an effect's square must grow to be named."""
     # Share of an effect's square that the baseline does not explain, below which it explains all.
     nothing = 1e-10
     if squared(remainder) <= nothing * squared(problem.rows(column)[:, 0]):
-        return np.inf, "noise"
+        return np.inf
     price = 0.5 * columns * np.log(problem.independent) - weights(CRITERIA)[FEATURES.index("cause")]
-    by_noise = needed_noncentrality(columns, price, power) / squared(remainder)
-    # A good rig has a little of the effect: its amplitude is uncertain by that much.
-    torque = max(float(problem.torque_rms[problem.joint(effect)]), np.finfo(float).tiny)
-    share = problem.rms(effect, column) / torque
-    # As against noise, the amplitude must exceed its background by the root of twice the price.
-    by_background = (
-        2.0 * price * (CRITERIA.background_cause / share) ** 2 if share > 0.0 else np.inf
-    )
-    if by_noise >= by_background:
-        return by_noise, "noise"
-    return by_background, "materiality"
+    return needed_noncentrality(columns, price, power) / problem.shown(remainder)
 
 
 def _detectable(

@@ -32,6 +32,9 @@ class DetectionProblem:
     """(rows, size) orthonormal basis of the weighted baseline."""
     torque_rms: NDArray
     """(O,) N·m, of the baseline's torque."""
+    background: NDArray
+    """(rows, k) what a good rig has of each cause, one standard deviation, the baseline projected
+    out."""
 
     @classmethod
     def of(cls, runs: Sequence[Run], baseline: Baseline, floor: Floor) -> "DetectionProblem":
@@ -66,7 +69,7 @@ class DetectionProblem:
         rms = np.sqrt(np.mean(torque**2, axis=0))
         nothing = np.zeros((0, 0))
         return cls(
-            loaded, baseline, untouched, values, root, independent, nothing, rms
+            loaded, baseline, untouched, values, root, independent, nothing, rms, nothing
         )._with_basis()
 
     def weighted(self, weights: NDArray) -> "DetectionProblem":
@@ -117,6 +120,19 @@ class DetectionProblem:
         for _ in range(2):  # twice is enough for orthogonality to rounding
             rows = rows - self.basis @ (self.basis.T @ rows)
         return rows
+
+    def shown(self, remainder: NDArray) -> float:
+        """Return the squared length of a remainder (rows,) that the background does not explain.
+
+        The background is marginalised, as in a diagnosis: with its columns B the noise has the
+        covariance I + BB'.
+        """
+        whole = float(remainder @ remainder)
+        if not self.background.size:
+            return whole
+        B = self.background
+        along = B.T @ remainder
+        return whole - float(along @ np.linalg.solve(np.eye(B.shape[1]) + B.T @ B, along))
 
     def joint(self, effect: Effect) -> int:
         """Return the joint at which an effect's size is given: its own, if it is measured.
