@@ -1,11 +1,8 @@
 """An excitation that is designed for sizes shows causes of these sizes; a usual one does not."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
-from pipelines.contracts.table import Table
 from pipelines.design.excitation import design
 from pipelines.diagnosis.diagnose import diagnose
 from pipelines.errors import InputError
@@ -13,15 +10,11 @@ from pipelines.investigation.planned import PlannedRuns
 from pipelines.investigation.sizes_design import sizes_design, smallest_sizes
 from pipelines.investigation.wanted_sizes import wanted_sizes
 from pipelines.mechanics.geometry import Geometry
-from pipelines.mechanics.kinematics import motion_table
 from pipelines.mechanics.machine import THE_LEG
-from pipelines.mechanics.motion import motion_from_table
 from pipelines.model import Term
-from pipelines.rig.plant import Plant
-from pipelines.rig.record import record
 from pipelines.settings.design import DesignSettings
-from pipelines.settings.filter import FilterSettings
 from pipelines.settings.rig.plant import PlantSettings
+from tests.campaigns.separation import session
 
 QUICK = DesignSettings(harmonics=3, particles=12, iterations=50)
 RUNS = PlannedRuns(QUICK, PlantSettings())
@@ -64,23 +57,10 @@ def test_equal_settings_give_an_equal_design(before, designed):
 
 
 @pytest.mark.slow
-def test_a_diagnosis_names_the_size_in_the_designed_excitation_only(usual, designed):
-    """Of a size between those that the two show."""
+def test_a_diagnosis_names_the_size_in_the_designed_excitation(designed):
     (one,) = wanted_sizes([HIDDEN], THE_LEG)
-    found = {}
-    for name, trajectory in (("usual", usual), ("designed", designed.design.trajectory)):
-        motions = []
-        for number, (run, purpose) in enumerate(
-            (run, purpose) for run in RUNS.kinds for purpose in ("train", "validate")
-        ):
-            hidden = [Term(one.effect, np.array([1.2 * one.size]))]
-            plant = Plant(PlantSettings(), run, seed=50 + number, effects=hidden)
-            table = Table(*record(plant, trajectory, 40.0, purpose))
-            motion = motion_from_table(motion_table(table, FilterSettings()))
-            motions.append(replace(motion, file=f"run_{number}.parquet"))
-        outcome = diagnose(motions)
-        found[name] = list(outcome.causes)
-    assert found == {"usual": [], "designed": [one.label]}
+    term = Term(one.effect, np.array([1.2 * one.size]))
+    assert list(diagnose(session(term, designed.design.trajectory, 12)).causes) == [one.label]
 
 
 def test_of_a_stiffness_less_is_more_and_a_gain_is_counted_from_one(usual):
