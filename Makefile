@@ -30,7 +30,7 @@ all: $(INSTALLED) ## the default experiment from its design to its report, into 
 	@echo "what is done, stale or missing: $(BIN)/exoid status --config datasets/experiments/default.toml --out build/default"
 
 test: $(INSTALLED) ## the tests
-	$(BIN)/pytest -n 2 --dist loadfile -m "not slow"
+	$(BIN)/pytest -n 3 --dist loadfile -m "not slow"
 
 test-slow: $(INSTALLED) ## the statistical campaigns, minutes long
 	$(BIN)/pytest -n 2 -m slow

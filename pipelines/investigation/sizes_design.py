@@ -90,7 +90,7 @@ def sizes_design(
     report : callable, optional
         Called with the share that is done, 0 to 1, and a note.
     """
-    settings, found, sizes = runs.settings, [], before
+    settings, designs, sizes = runs.settings, [], before
     # The background takes another share in the new motion, for which it is searched again.
     for start in (0.0, 0.5):
 
@@ -100,8 +100,8 @@ def sizes_design(
         trajectory, stopped_by = _search(sizes, runs, geometry, report_part)
         sizes = smallest_sizes(before.wanted, runs, trajectory)
         design = Design(trajectory, quality(trajectory, settings, geometry), settings, stopped_by)
-        found.append(SizesDesign(design, sizes, before))
-    return max(found, key=lambda one: float(one.sizes.shares().min()))
+        designs.append(SizesDesign(design, sizes, before))
+    return max(designs, key=lambda one: float(one.sizes.shares().min()))
 
 
 def _search(
