@@ -1,7 +1,7 @@
 """``exoid design``: search an excitation, or judge one."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import Annotated, Any, Literal
 
 import typer
 
@@ -12,9 +12,6 @@ from exoid_cli.options import AgainOption, ConfigOption, output_option
 from exoid_cli.separate import design_separation, evaluate_separation, question_of
 from exoid_cli.sizes import design_sizes, evaluate_sizes, sizes_of
 from exoid_cli.stage_runner import run_stages
-
-if TYPE_CHECKING:
-    pass
 
 
 def design(
