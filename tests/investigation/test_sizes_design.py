@@ -92,6 +92,12 @@ def test_what_is_no_wanted_size_is_refused(texts, message):
     assert message in str(caught.value) and "\n" not in str(caught.value)
 
 
+def test_where_a_cause_is_impossible_the_expected_ones_are_no_part_of_every_model():
+    with pytest.raises(InputError) as caught:
+        wanted_sizes(["rotor_coupling@knee=1"], THE_LEG)
+    assert "cogging@knee" in str(caught.value) and " friction@knee" not in str(caught.value)
+
+
 def test_a_cause_that_planned_runs_cannot_show_is_refused(usual):
     wanted = wanted_sizes(["friction_temperature@knee=0.1"], THE_LEG)
     with pytest.raises(InputError, match=r"friction_temperature@knee cannot show in planned runs"):
