@@ -100,15 +100,16 @@ def design(
         elif output:
             _design(output, settings, geometry, mechanism)
         return
-    last = last_excitation(config, settings, geometry)
     if sizes:
-        shown = sizes_of(causes or (), experiment, settings)
+        wanted = sizes_of(causes or (), experiment, settings)
         if evaluate:
-            evaluate_sizes(evaluate, settings, geometry, shown)
+            evaluate_sizes(evaluate, settings, geometry, wanted)
         elif output:
-            design_sizes(output, shown, geometry, last, mechanism)
+            last = last_excitation(config, settings, geometry)
+            design_sizes(output, wanted, geometry, last, mechanism)
         return
     question = question_of(causes or (), verdict, experiment, settings)
+    last = last_excitation(config, settings, geometry)
     if evaluate:
         evaluate_separation(evaluate, settings, geometry, question, last)
     elif output:

@@ -17,12 +17,12 @@ Sizes = tuple["list[WantedSize]", "PlannedRuns"]
 
 
 def sizes_of(texts: Sequence[str], experiment: Any, settings: Any) -> Sizes:
-    """Return the wanted sizes that are named, and the runs to plan.
+    """Return the causes with the wanted sizes that a user gives, and the runs to plan.
 
     Raises
     ------
     InputError
-        Where one is none, or its cause is part of the model.
+        If a text is no cause with a size, or its cause is in ``diagnose.known``.
     """
     from pipelines.diagnosis.detectability.planned_runs import usual_plant
     from pipelines.errors import InputError
