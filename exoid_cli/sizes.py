@@ -91,7 +91,10 @@ def _show(columns: "dict[str, SmallestSizes]") -> None:
         )
         for k, one in enumerate(judged[-1].wanted)
     ]
-    console.say("\nSmallest size that a diagnosis would name in nine of ten experiments:")
+    console.say(
+        "\nSmallest size (of a stiffness the largest) that a diagnosis would name in nine of ten"
+        " experiments:"
+    )
     numbers = ("wanted", *columns)
     console.table(("cause", "unit", *numbers, "shows"), rows, numbers=", ".join(numbers))
     hidden = [row[0] for row in rows if row[-1] == "NO"]
