@@ -100,6 +100,6 @@ def _show(columns: "dict[str, SmallestSizes]") -> None:
     hidden = [row[0] for row in rows if row[-1] == "NO"]
     if hidden:
         console.warn(
-            f"{', '.join(hidden)}: smaller than this excitation shows; wider [design.bounds], a"
-            " longer run ([design.noise] duration_s) or less noise would show it"
+            f"{', '.join(hidden)}: too small an effect for this excitation; wider [design.bounds],"
+            " a longer run ([design.noise] duration_s) or less noise would show it"
         )
