@@ -1,7 +1,7 @@
 """``exoid design``: search an excitation, or judge one."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import Annotated, Any, Literal
 
 import typer
 
@@ -12,9 +12,6 @@ from exoid_cli.options import AgainOption, ConfigOption, output_option
 from exoid_cli.separate import design_separation, evaluate_separation, question_of
 from exoid_cli.sizes import design_sizes, evaluate_sizes, sizes_of
 from exoid_cli.stage_runner import run_stages
-
-if TYPE_CHECKING:
-    pass
 
 
 def design(
@@ -103,15 +100,16 @@ def design(
         elif output:
             _design(output, settings, geometry, mechanism)
         return
-    last = last_excitation(config, settings, geometry)
     if sizes:
-        shown = sizes_of(causes or (), experiment, settings)
+        wanted = sizes_of(causes or (), experiment, settings)
         if evaluate:
-            evaluate_sizes(evaluate, settings, geometry, shown)
+            evaluate_sizes(evaluate, settings, geometry, wanted)
         elif output:
-            design_sizes(output, shown, geometry, last, mechanism)
+            last = last_excitation(config, settings, geometry)
+            design_sizes(output, wanted, geometry, last, mechanism)
         return
     question = question_of(causes or (), verdict, experiment, settings)
+    last = last_excitation(config, settings, geometry)
     if evaluate:
         evaluate_separation(evaluate, settings, geometry, question, last)
     elif output:

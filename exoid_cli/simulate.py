@@ -197,7 +197,7 @@ def _report_loop(
 def _replay(table: "Table", recording: Path, settings: "Experiment", output: Path) -> None:
     from pipelines.contracts import SIMULATION, describe
     from pipelines.dynamics.plant import plant_from_table
-    from pipelines.dynamics.replay import replay
+    from pipelines.dynamics.replay import WINDOW_S, replay
     from pipelines.errors import InputError
     from pipelines.mechanics.even_grid import on_even_grid
     from pipelines.mechanics.read import geometry_from, read_motion
@@ -209,8 +209,9 @@ def _replay(table: "Table", recording: Path, settings: "Experiment", output: Pat
         replayed = replay(plant.model, motion)
     if not all(map(isfinite, replayed.rmse.tolist())):
         raise InputError(
-            f"{recording}: its simulation with {table.path} diverges within 1 s; identify again"
-            " from richer motions, and check parameters whose interval contains 0 (`exoid show`)"
+            f"{recording}: its simulation with {table.path} diverges within {WINDOW_S:g} s;"
+            " identify again from richer motions, and check parameters whose interval contains 0"
+            " (`exoid show`)"
         )
     open_loop, closed_loop = recorded.open_loop_frame(replayed, motion, plant.joints), None
     inputs = [path for path in (table.path, recording) if path]

@@ -17,12 +17,12 @@ Sizes = tuple["list[WantedSize]", "PlannedRuns"]
 
 
 def sizes_of(texts: Sequence[str], experiment: Any, settings: Any) -> Sizes:
-    """Return the wanted sizes that are named, and the runs to plan.
+    """Return the causes with the wanted sizes that a user gives, and the runs to plan.
 
     Raises
     ------
     InputError
-        Where one is none, or its cause is part of the model.
+        If a text is no cause with a size, or its cause is in ``diagnose.known``.
     """
     from pipelines.diagnosis.detectability.planned_runs import usual_plant
     from pipelines.errors import InputError
@@ -91,12 +91,15 @@ def _show(columns: "dict[str, SmallestSizes]") -> None:
         )
         for k, one in enumerate(judged[-1].wanted)
     ]
-    console.say("\nSmallest size that a diagnosis would name in nine of ten experiments:")
+    console.say(
+        "\nSmallest size (of a stiffness the largest) that a diagnosis would name in nine of ten"
+        " experiments:"
+    )
     numbers = ("wanted", *columns)
     console.table(("cause", "unit", *numbers, "shows"), rows, numbers=", ".join(numbers))
     hidden = [row[0] for row in rows if row[-1] == "NO"]
     if hidden:
         console.warn(
-            f"{', '.join(hidden)}: smaller than this excitation shows; wider [design.bounds], a"
-            " longer run ([design.noise] duration_s) or less noise would show it"
+            f"{', '.join(hidden)}: too small an effect for this excitation; wider [design.bounds],"
+            " a longer run ([design.noise] duration_s) or less noise would show it"
         )

@@ -70,7 +70,7 @@ def is_gray(register: Register, values: NDArray) -> bool:
     values : (n,) array
         New values in a row, as it reads them, SI units.
     """
-    # Values that are no coincidence, and the share of the travel that bytes of their own leave.
+    # Values that are no coincidence, and the share of the travel that decoding leaves.
     enough, least = 30, 0.5
     if not _is_judged(register) or len(values) <= enough:
         return False

@@ -168,12 +168,14 @@ def leaping(time_s: NDArray, values: NDArray) -> Iterator[str]:
     values : (n,) array
         In any unit, NaN where missing.
     """
+    known = np.isfinite(values)
+    time_s, values = time_s[known], values[known]
     rows = leaps(time_s, values)
     if len(rows):
         yield (
             f"values leap, first by {abs(values[rows[0]] - values[rows[0] - 1]):.4g} at"
-            f" {time_s[rows[0]]:.4g} s, as no mass can; a gateway may repeat old values until"
-            " then; let it answer with an exception where a device is silent"
+            f" {time_s[rows[0]]:.4g} s, as no mass can; a gateway may have repeated old values"
+            " until then; let it answer with an exception where a device is silent"
         )
 
 

@@ -4,7 +4,6 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,11 +18,9 @@ from pipelines.importing.quantities.numbers import TAKEN_FOR_MISSING, numbers, s
 from pipelines.importing.sources.source import Columns, Source
 from pipelines.importing.time import clock
 from pipelines.importing.time.clock import Run
-from pipelines.settings.import_map import ImportMap, ReadingSettings, TimeSettings
+from pipelines.settings.import_map import ImportMap, TimeSettings
 from pipelines.signals.sampling import between_samples, sample_rate
 from pipelines.validation.suggestion import suggestion
-
-Reading = TypeVar("Reading", bound=ReadingSettings)
 
 
 @dataclass(frozen=True)

@@ -43,6 +43,11 @@ class WantedSize:
         return abs(size - (0.0 if effect.linear else effect.shape[0].neutral))
 
     @property
+    def less_is_more(self) -> bool:
+        """Whether a smaller size is a larger effect, as of a stiffness in series."""
+        return not self.effect.linear and self.effect.shape[0].name == "stiffness"
+
+    @property
     def unit(self) -> str:
         """Of the size; empty where it has none."""
         unit = self.effect.parameters[0].unit
@@ -57,8 +62,7 @@ class SmallestSizes:
     smallest: tuple[float, ...]
     """In the unit of each wanted size; inf where no size shows."""
     growth: tuple[float, ...]
-    """Of each, relative to the smallest by noise alone; below 1 for a stiffness, of which less is
-    more."""
+    """Of each, relative to the smallest by noise alone."""
 
     @classmethod
     def of(cls, wanted: Sequence[WantedSize], problem: DetectionProblem) -> "SmallestSizes":
@@ -90,9 +94,9 @@ class SmallestSizes:
     def shares(self) -> NDArray:
         """Return each wanted size relative to the smallest that shows, (n,); from 1 on it shows."""
         shares = []
-        for one, size, growth in zip(self.wanted, self.smallest, self.growth, strict=True):
+        for one, size in zip(self.wanted, self.smallest, strict=True):
             share = one.amount(one.size) / one.amount(size) if isfinite(size) else 0.0
-            shares.append(1.0 / share if growth < 1.0 and share > 0.0 else share)
+            shares.append(1.0 / share if one.less_is_more and share > 0.0 else share)
         return np.array(shares)
 
     def as_json(self) -> list[dict[str, Any]]:

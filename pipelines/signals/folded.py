@@ -33,16 +33,17 @@ def is_folded(values: NDArray) -> bool:
         New readings in a row, in any unit, zero where the quantity is zero; NaN where missing.
     """
     known = values[np.isfinite(values)]
+    lengths = [length for length in LENGTHS if len(known) >= 4 * length]
+    if not lengths:
+        return False
     # Where means of many rows do not resolve a turn, single rows go through zero.
-    turned = np.concatenate(
-        [
-            _turned(known[: len(known) // length * length].reshape(-1, length).mean(axis=1))
-            for length in LENGTHS
-            if len(known) >= 4 * length
-        ]
-        or [np.zeros(0, dtype=bool)]
+    rows, turned = (
+        np.concatenate(parts)
+        for parts in zip(*(_crossings(known, length) for length in lengths), strict=True)
     )
-    return bool(len(turned) >= CROSSINGS and np.mean(turned) >= SHARE)
+    # One crossing may show at several lengths, each within a few of its rows.
+    apart = len(np.unique(rows // (2 * LENGTHS[-1])))
+    return bool(apart >= CROSSINGS and np.mean(turned) >= SHARE)
 
 
 def is_folded_angle(values: NDArray) -> bool:
@@ -61,8 +62,17 @@ def is_folded_angle(values: NDArray) -> bool:
     return not starts_again and is_folded(known)
 
 
-def _turned(values: NDArray) -> NDArray:
-    """Return for each crossing that values (n,) come to whether they turn round there instead."""
+def _crossings(known: NDArray, length: int) -> tuple[NDArray, NDArray]:
+    """Return the crossings that means over some rows of values (n,) come to.
+
+    Returns
+    -------
+    rows : (k,) array
+        The row of each.
+    turned : (k,) array
+        Whether values turn round there instead.
+    """
+    values = known[: len(known) // length * length].reshape(-1, length).mean(axis=1)
     step = smallest_step(np.abs(values))
     before, here, after = values[1:-2], values[2:-1], values[3:]
     ahead = 2.0 * here - before
@@ -74,4 +84,4 @@ def _turned(values: NDArray) -> NDArray:
     # A spike to zero and back turns round, too, but did not come on a straight line.
     came_straight = np.abs(values[:-3] - 2.0 * before + here) < 0.7 * np.abs(here - before)
     crosses = (ahead < -2.0 * max(step, noise)) & came_straight
-    return np.asarray(after[crosses] > -0.5 * ahead[crosses])
+    return (np.flatnonzero(crosses) + 3) * length, after[crosses] > -0.5 * ahead[crosses]

@@ -75,7 +75,11 @@ def cause_at(label: str, machine: Machine, setting: str) -> Effect:
             f"{setting}: found {label}, which every model has; name a cause that `exoid effects`"
             " lists"
         )
-    return effect_at(label, machine, lambda kind: True, setting)
+    return effect_at(label, machine, _is_cause, setting)
+
+
+def _is_cause(effect: type[Effect]) -> bool:
+    return effect.name not in BASELINE
 
 
 def effect_of_cause(cause: "Cause | Tie") -> Effect:

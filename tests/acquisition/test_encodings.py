@@ -271,6 +271,9 @@ def test_an_angle_that_leaps_after_old_values_is_named():
     held = np.where((time_s > 2.0) & (time_s < 3.0), SWING[100], SWING)
     (text,) = leaping(time_s, held)
     assert "as no mass can" in text
+    # It leaps from the last value that is known, too.
+    (text,) = leaping(time_s, np.where((time_s > 2.97) & (time_s < 3.0), np.nan, held))
+    assert "as no mass can" in text and "nan" not in text
     # Steps of a coarse reading, and of a joint that is moved from stop to stop, are none.
     assert not list(leaping(time_s, np.round(5.0 * SWING) / 5.0))
     assert not list(leaping(time_s, np.where(time_s > 3.0, 1.0, 1e-4 * SWING)))

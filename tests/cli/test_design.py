@@ -146,6 +146,10 @@ def test_a_verdict_of_another_machine_is_refused_for_that(tmp_path, monkeypatch,
         (["--separate", *PAIR, "--from", "diagnosed"], "one of the three"),
         (["--separate", "base_tilt", "nonsense", "-o", "n.parquet"], "no effect 'nonsense'"),
         (["--from", "nowhere", "-o", "n.parquet"], "nowhere"),
+        (["--sizes", "-o", "n.parquet"], "expected causes after --separate or --sizes"),
+        (["--sizes", "cogging@knee=1"], "-o: missing"),
+        (["--sizes", "--separate", *PAIR], "one of the three"),
+        (["--sizes", "cogging@knee", "-o", "n.parquet"], "expected EFFECT@JOINT=SIZE"),
     ],
 )
 def test_a_question_that_no_excitation_answers_ends_in_one_line(
@@ -193,3 +197,11 @@ def test_next_says_that_it_writes_no_motion_where_none_separates_the_causes(
     assert run(["next", str(folder), "--config", config, "-o", str(out)]) == 0
     assert f"{out}: not written, as no motion" in " ".join(capsys.readouterr().err.split())
     assert not out.exists()
+
+
+def test_no_excitation_is_searched_to_judge_one_for_sizes(monkeypatch):
+    judged = []
+    monkeypatch.setattr("exoid_cli.design.last_excitation", None)
+    monkeypatch.setattr("exoid_cli.design.evaluate_sizes", lambda *given: judged.append(given[0]))
+    assert run(["design", "--sizes", "cogging@knee=1", "--evaluate", PUBLISHED]) == 0
+    assert [str(file) for file in judged] == [PUBLISHED]

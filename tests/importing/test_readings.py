@@ -7,6 +7,7 @@ import pandas as pd
 import pytest
 from numpy.testing import assert_allclose
 
+from pipelines.importing.quantities.numbers import have_minutes
 from pipelines.settings.units import UNITS
 from tests.importing.conftest import MAP
 from tests.importing.test_guess import guessed
@@ -801,6 +802,10 @@ def test_minutes_that_are_read_as_decimals_of_a_degree_are_named(
         outcome = imported(path, map_text=text)
         assert outcome.code == 0, outcome.err
         assert ("decimals never reach .60" in outcome.printed) == is_named
+
+
+def test_an_outlier_above_all_integers_is_no_minute():
+    assert not have_minutes(np.array([1.0, 2.0, 1e30, np.nan]))
 
 
 def test_a_torque_that_is_cut_off_is_named(imported, pendulum, write_csv):

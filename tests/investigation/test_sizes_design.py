@@ -8,7 +8,7 @@ from pipelines.diagnosis.diagnose import diagnose
 from pipelines.errors import InputError
 from pipelines.investigation.planned import PlannedRuns
 from pipelines.investigation.sizes_design import sizes_design, smallest_sizes
-from pipelines.investigation.wanted_sizes import wanted_sizes
+from pipelines.investigation.wanted_sizes import SmallestSizes, wanted_sizes
 from pipelines.mechanics.geometry import Geometry
 from pipelines.mechanics.machine import THE_LEG
 from pipelines.model import Term
@@ -90,6 +90,21 @@ def test_what_is_no_wanted_size_is_refused(texts, message):
     with pytest.raises(InputError) as caught:
         wanted_sizes(texts, THE_LEG)
     assert message in str(caught.value) and "\n" not in str(caught.value)
+
+
+def test_where_a_cause_is_impossible_the_expected_ones_are_no_part_of_every_model():
+    with pytest.raises(InputError) as caught:
+        wanted_sizes(["rotor_coupling@knee=1"], THE_LEG)
+    assert "cogging@knee" in str(caught.value) and " friction@knee" not in str(caught.value)
+
+
+def test_a_share_is_inverted_for_a_stiffness_alone_whatever_the_background():
+    """A search ends within a hundredth of a size, so that a size may seem to shrink by as much."""
+    texts = ["joint_elasticity@knee=150", "encoder_offset@knee=0.05"]
+    wanted = tuple(wanted_sizes(texts, THE_LEG))
+    for growth in (0.995, 1.005):
+        shares = SmallestSizes(wanted, (300.0, 0.1), (growth, growth)).shares()
+        assert shares == pytest.approx([2.0, 0.5])
 
 
 def test_a_cause_that_planned_runs_cannot_show_is_refused(usual):

@@ -103,3 +103,9 @@ def test_the_magnitude_of_an_angle_is_named(noise):
 def test_an_angle_with_its_sign_is_not(channel):
     named = [is_folded_angle(channel(np.random.default_rng(seed))) for seed in range(SEEDS)]
     assert np.mean(named) <= 0.02
+
+
+@pytest.mark.parametrize("turns", [1, 2, 3])
+def test_a_joint_that_rebounds_a_few_times_is_no_magnitude(turns):
+    angle = np.abs(np.sin(np.pi * turns * SECONDS / SECONDS[-1] + 0.5))
+    assert not is_folded_angle(angle + np.random.default_rng(0).normal(0.0, 1e-5, len(angle)))

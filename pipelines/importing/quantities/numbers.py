@@ -146,6 +146,8 @@ def have_minutes(degrees: NDArray) -> bool:
     # Whole degrees that are passed, and hundredths that occur: decimals of coarse steps are few.
     passed, many = 10, 30
     size = np.abs(degrees[np.isfinite(degrees)])
+    # Hundredths of an outlier may be above all integers of 64 bits.
+    size = size[size < 2.0**40]
     # A decimal fraction lies next to its float, on either side.
     hundredths = np.floor(100.0 * size + 1e-6).astype(np.int64)
     whole, parts = np.divmod(hundredths, 100)

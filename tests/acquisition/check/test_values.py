@@ -37,3 +37,23 @@ def test_a_device_that_is_slower_than_the_rows_is_named(new_hz, late_s):
 def test_rows_that_a_busy_computer_reads_late_are_no_slow_device(late_s):
     for seed in range(20):
         assert list(check_values(PROBE, angles(RATE_HZ, late_s, seed), RATE_HZ)) == []
+
+
+@pytest.mark.parametrize("new_hz", [60.0, 80.0])
+def test_a_counted_sample_with_the_value_of_the_one_before_is_named(new_hz):
+    answered = 0.001 * np.arange(1, 1500)
+    samples = np.floor(answered * RATE_HZ + 1e-9).astype(int)
+    renewed = np.floor(samples / RATE_HZ * new_hz + 1e-9) / new_hz
+    counts = np.round(20000.0 * np.sin(7.0 * renewed)).astype(int) & 0xFFFF
+    block = Block(
+        {
+            "sequence": Register(address=0, type="uint16"),
+            "angle": Register(address=1, type="int16", scale=1e-4, unit="rad"),
+        }
+    )
+    answers = [
+        (t - 0.001, t, [int(k), int(n)]) for t, k, n in zip(answered, samples, counts, strict=True)
+    ]
+    series = Series.of_answers(block, answers)
+    texts = [one.text for one in check_values(PROBE, series, RATE_HZ)]
+    assert any("new values come at" in text for text in texts)
