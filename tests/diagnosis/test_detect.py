@@ -16,9 +16,11 @@ from pipelines.diagnosis.detectability.detectability import (
     detectability,
     needed_noncentrality,
 )
+from pipelines.diagnosis.detectability.detection_problem import DetectionProblem
 from pipelines.diagnosis.detectability.planned_runs import planned_motions, planned_noise
 from pipelines.diagnosis.evidence.baseline import baseline_of
 from pipelines.diagnosis.evidence.baseline_columns import columns_under
+from pipelines.diagnosis.evidence.block_rate import at_block_rate
 from pipelines.diagnosis.evidence.noise_floor import Floor
 from pipelines.diagnosis.evidence.observed_run import observe
 from pipelines.mechanics.fourier import FourierTrajectory
@@ -198,3 +200,20 @@ def test_what_a_motion_shows_at_no_size_is_like_nothing_that_it_shows():
         candidate=None,
     )
     assert not _alike(unseen, np.array([0.0, 0.5, 1.0])).any()
+
+
+def test_what_the_background_leaves_is_the_product_with_the_inverse_of_its_covariance():
+    rng = np.random.default_rng(4)
+    problem = DetectionProblem.of(
+        [at_block_rate(run) for run in runs_on(RICH, ("exo_alone",))],
+        baseline_of(runs_on(RICH, ("exo_alone",))),
+        planned_noise(NOISE, 200.0, BlockAverage(5)),
+    )
+    columns, remainder = rng.normal(size=(60, 5)), rng.normal(size=60)
+    for scale in (0.0, 0.3, 100.0):
+        B = scale * columns
+        shown = replace(problem, background=B).shown(remainder)
+        whole = remainder @ np.linalg.solve(np.eye(60) + B @ B.T, remainder)
+        assert shown == pytest.approx(whole, rel=1e-4)
+    # A column of the background itself leaves what its standard deviation is of it.
+    assert replace(problem, background=1e6 * columns).shown(1e6 * columns[:, 0]) < 1.01

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -127,12 +128,18 @@ class DetectionProblem:
         The background is marginalised, as in a diagnosis: with its columns B the noise has the
         covariance I + BB'.
         """
-        whole = float(remainder @ remainder)
-        if not self.background.size:
-            return whole
         B = self.background
-        along = B.T @ remainder
-        return whole - float(along @ np.linalg.solve(np.eye(B.shape[1]) + B.T @ B, along))
+        if not B.size:
+            return float(remainder @ remainder)
+        # The minimum of |r - B z|² + |z|², which is that product without a difference of large
+        # numbers.
+        z = np.linalg.solve(self._background_gram, B.T @ remainder)
+        rest = remainder - B @ z
+        return float(rest @ rest + z @ z)
+
+    @cached_property
+    def _background_gram(self) -> NDArray:
+        return np.eye(self.background.shape[1]) + self.background.T @ self.background
 
     def joint(self, effect: Effect) -> int:
         """Return the joint at which an effect's size is given: its own, if it is measured.
