@@ -10,9 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipelines.design.evolution import polish
+from pipelines.design.excitation import Design
 from pipelines.design.fitness import costs
+from pipelines.design.quality import quality
 from pipelines.design.search import Report, first_swarm, search_problem, spread_of, trajectory_of
-from pipelines.mechanics.fourier import FourierTrajectory
 from pipelines.mechanics.geometry import Geometry
 from pipelines.mechanics.trajectory import Trajectory
 from pipelines.settings.design import DesignSettings
@@ -28,8 +29,8 @@ def polished_search(
     report: Report,
     check: Callable[[Trajectory], None] = lambda start: None,
     least_gain: float = 3e-4,
-) -> tuple[FourierTrajectory, str]:
-    """Return the best excitation, and ``stagnation`` or ``seconds`` for what ended the search.
+) -> Design:
+    """Return the best excitation.
 
     Equal settings give an equal excitation, unless ``seconds`` ended the search.
 
@@ -79,4 +80,5 @@ def polished_search(
         least_gain=least_gain,
     )
     stopped_by = "seconds" if time.monotonic() > deadline else "stagnation"
-    return trajectory_of(best, problem), stopped_by
+    trajectory = trajectory_of(best, problem)
+    return Design(trajectory, quality(trajectory, settings, geometry), settings, stopped_by)

@@ -11,14 +11,12 @@ from typing import Any
 import numpy as np
 
 from pipelines.design.excitation import Design
-from pipelines.design.quality import quality
 from pipelines.design.search import Report
 from pipelines.errors import NotIdentifiable
 from pipelines.investigation.planned import PlannedRuns
 from pipelines.investigation.polished_search import polished_search
 from pipelines.investigation.rivals import Rival, SizedRival, sized
 from pipelines.investigation.separation import Separation
-from pipelines.mechanics.fourier import FourierTrajectory
 from pipelines.mechanics.geometry import Geometry
 from pipelines.mechanics.trajectory import Trajectory
 
@@ -72,10 +70,8 @@ def separating_design(
     NotIdentifiable
         Where no motion within the bounds separates two of them.
     """
-    trajectory, stopped_by = _search(before.rivals, runs, geometry, report)
-    settings = runs.settings
-    design = Design(trajectory, quality(trajectory, settings, geometry), settings, stopped_by)
-    return SeparatingDesign(design, separation(before.rivals, runs, trajectory), before)
+    design = _search(before.rivals, runs, geometry, report)
+    return SeparatingDesign(design, separation(before.rivals, runs, design.trajectory), before)
 
 
 def separation_of_last(rivals: Sequence[Rival], runs: PlannedRuns, last: Trajectory) -> Separation:
@@ -100,8 +96,8 @@ def separation(
 
 def _search(
     rivals: Sequence[SizedRival], runs: PlannedRuns, geometry: Geometry, report: Report
-) -> tuple[FourierTrajectory, str]:
-    """Return the best excitation, and ``stagnation`` or ``seconds`` for what ended the search."""
+) -> Design:
+    """Return the excitation of the largest expected log odds."""
     best_odds = -np.inf
 
     def cost(trajectory: Trajectory, log_det: float) -> tuple[float, str]:

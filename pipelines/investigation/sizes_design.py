@@ -11,14 +11,12 @@ from typing import Any
 import numpy as np
 
 from pipelines.design.excitation import Design
-from pipelines.design.quality import quality
 from pipelines.design.search import Report
 from pipelines.diagnosis.detectability.detection_problem import DetectionProblem
 from pipelines.errors import InputError
 from pipelines.investigation.planned import PlannedRuns
 from pipelines.investigation.polished_search import polished_search
 from pipelines.investigation.wanted_sizes import SETTING, SmallestSizes, WantedSize
-from pipelines.mechanics.fourier import FourierTrajectory
 from pipelines.mechanics.geometry import Geometry
 from pipelines.mechanics.trajectory import Trajectory
 
@@ -90,24 +88,21 @@ def sizes_design(
     report : callable, optional
         Called with the share that is done, 0 to 1, and a note.
     """
-    settings, designs, sizes = runs.settings, [], before
+    designs, sizes = [], before
     # The background takes another share in the new motion, for which it is searched again.
     for start in (0.0, 0.5):
 
         def report_part(done: float, note: str, start: float = start) -> None:
             report(start + 0.5 * done, note)
 
-        trajectory, stopped_by = _search(sizes, runs, geometry, report_part)
-        sizes = smallest_sizes(before.wanted, runs, trajectory)
-        design = Design(trajectory, quality(trajectory, settings, geometry), settings, stopped_by)
+        design = _search(sizes, runs, geometry, report_part)
+        sizes = smallest_sizes(before.wanted, runs, design.trajectory)
         designs.append(SizesDesign(design, sizes, before))
     return max(designs, key=lambda one: float(one.sizes.shares().min()))
 
 
-def _search(
-    sizes: SmallestSizes, runs: PlannedRuns, geometry: Geometry, report: Report
-) -> tuple[FourierTrajectory, str]:
-    """Return the best excitation with the growth of some sizes, and what ended the search."""
+def _search(sizes: SmallestSizes, runs: PlannedRuns, geometry: Geometry, report: Report) -> Design:
+    """Return the best excitation with the growth of some sizes."""
     best = 0.0
 
     def cost(trajectory: Trajectory, log_det: float) -> tuple[float, str]:
