@@ -16,6 +16,9 @@ from pipelines.importing.sources.source import Columns, Source
 from pipelines.settings.import_map import TimeSettings
 from pipelines.settings.units import ALIASES, UNITS
 
+SQUARES_TO_ONE = 0.01
+"""Largest error of the sum of the squares of a sine and a cosine."""
+
 
 def contradictions(
     channels: Sequence[Channel], columns: Columns, time: TimeSettings, source: Source
@@ -84,6 +87,7 @@ def _with_unit(name: str, source: Source) -> str:
 
 def _derived(channels: Sequence[Channel], columns: Columns, source: Source) -> Iterator[Finding]:
     """Report changes of an angle, and sines or cosines of it, that the map has as the angle."""
+    others: Columns | None = None
     for channel in channels:
         name = channel.reading.column
         if name is None or not channel.where.endswith(".angle"):
@@ -95,27 +99,32 @@ def _derived(channels: Sequence[Channel], columns: Columns, source: Source) -> I
                 f"the name of {name!r} says a change from row to row, or a function of an angle",
                 action,
             )
-        elif other := _other_leg(columns[name], source, columns):
-            seen = f"{name!r} and {other!r} are sine and cosine: their squares add to 1"
-            yield Finding(channel.target, seen, action)
+        elif _may_be_a_sine(columns[name]):
+            if others is None:
+                loaded = source.load([one for one in source.names if one not in columns])
+                others = {other: numbers(raw) for other, raw in loaded.items()}
+            if (other := _other_leg(columns[name], others)) is not None:
+                seen = f"{name!r} and {other!r} are sine and cosine: their squares add to 1"
+                yield Finding(channel.target, seen, action)
 
 
-def _other_leg(values: NDArray, source: Source, columns: Columns) -> str | None:
+def _may_be_a_sine(values: NDArray) -> bool:
+    """Return whether values (n,) lie within -1 and 1."""
+    known = values[np.isfinite(values)] if values.dtype.kind == "f" else np.zeros(0)
+    return 0.0 < float(np.max(known**2, initial=0.0)) <= 1.0 + SQUARES_TO_ONE
+
+
+def _other_leg(values: NDArray, others: Columns) -> str | None:
     """Return the column whose square, and that of values (n,), add to 1 in all rows, if any."""
     # Largest part of the change of a square that noise and rounded digits leave in the sum.
     share = 0.1
-    # Largest error of the sum itself.
-    tolerance = 0.01
-    rows = np.isfinite(values) if values.dtype.kind == "f" else np.zeros(0, dtype=bool)
-    square = values[rows] ** 2 if rows.any() else np.zeros(1)
-    if not 0.0 < np.max(square) <= 1.0 + tolerance:
-        return None
-    for name, raw in source.load([one for one in source.names if one not in columns]).items():
-        other = numbers(raw)
+    rows = np.isfinite(values)
+    square = values[rows] ** 2
+    for name, other in others.items():
         if len(other) != len(values):
             continue
         total = square + other[rows] ** 2
-        if np.std(total) < share * np.std(square) and abs(np.mean(total) - 1.0) < tolerance:
+        if np.std(total) < share * np.std(square) and abs(np.mean(total) - 1.0) < SQUARES_TO_ONE:
             return name
     return None
 
