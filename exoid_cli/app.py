@@ -39,6 +39,7 @@ from exoid_cli.global_options import Command, JsonOption, QuietOption, with_glob
 from exoid_cli.identify import identify
 from exoid_cli.import_ import import_
 from exoid_cli.init import init
+from exoid_cli.investigate import investigate
 from exoid_cli.next_ import next_
 from exoid_cli.recover import recover
 from exoid_cli.report import report
@@ -81,6 +82,7 @@ _add("filter", filter_, "Filter a recording's angles and differentiate them.")
 _add("identify", identify, "Fit the leg's parameters; judge them on other runs.")
 _add("diagnose", diagnose, "Name what the model gets wrong, and measure the gain.")
 _add("next", next_, "Say which experiment would decide between causes.")
+_add("investigate", investigate, "Record further experiments until a verdict is sure.")
 _add("simulate", simulate, "Simulate the identified leg, or replay a recording.")
 _add("report", report, "Write one page that shows all results.")
 _add("figures", figures, "Draw the report's figures as PDF and PNG.")

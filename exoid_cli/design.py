@@ -6,7 +6,7 @@ from typing import Annotated, Any, Literal
 import typer
 
 from exoid_cli.console import console
-from exoid_cli.excitation import last_excitation, show_quality, warn_of_cut, write_excitation
+from exoid_cli.excitation import excitations, show_quality, warn_of_cut, write_excitation
 from exoid_cli.experiment_folder import open_experiment, settings_in_force
 from exoid_cli.options import AgainOption, ConfigOption, output_option
 from exoid_cli.separate import design_separation, evaluate_separation, question_of
@@ -105,15 +105,14 @@ def design(
         if evaluate:
             evaluate_sizes(evaluate, settings, geometry, wanted)
         elif output:
-            last = last_excitation(config, settings, geometry)
-            design_sizes(output, wanted, geometry, last, mechanism)
+            name, motions = excitations(config, settings, geometry)
+            design_sizes(output, wanted, geometry, (name, motions[-1]), mechanism)
         return
-    question = question_of(causes or (), verdict, experiment, settings)
-    last = last_excitation(config, settings, geometry)
+    question = question_of(causes or (), verdict, experiment, settings, config)
     if evaluate:
-        evaluate_separation(evaluate, settings, geometry, question, last)
+        evaluate_separation(evaluate, settings, geometry, question)
     elif output:
-        design_separation(output, question, geometry, last, mechanism)
+        design_separation(output, question, geometry, mechanism)
 
 
 def _evaluate(file: Path, settings: Any, geometry: Any) -> None:

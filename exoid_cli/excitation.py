@@ -12,16 +12,33 @@ if TYPE_CHECKING:
     from pipelines.mechanics.trajectory import Trajectory
 
 
-def last_excitation(config: Path | None, settings: Any, geometry: Any) -> "tuple[str, Trajectory]":
-    """Return the experiment's excitation, else the one that its settings give, and its name."""
+def excitations(
+    config: Path | None, settings: Any, geometry: Any, results: Path | None = None
+) -> "tuple[str, list[Trajectory]]":
+    """Return the excitations that were followed, or else are to be followed, and the last's name.
+
+    Parameters
+    ----------
+    config : Path or None
+        The experiment's exoid.toml.
+    settings : DesignSettings
+        They give the excitation where there is no file of one.
+    geometry : Geometry
+        Lengths and gravity.
+    results : Path, optional
+        Folder of the experiment's results, if it is not that of exoid.toml.
+    """
     from pipelines.design.excitation import design
     from pipelines.mechanics.trajectory import read_trajectory
+    from pipelines.workflow.investigation import motions_of
 
     if config is not None or in_experiment_folder():
-        file = open_experiment(config).step("design").target
-        if file.is_file():
-            return str(file), read_trajectory(file)
-    return f"the excitation of {settings.criterion}", design(settings, geometry).trajectory
+        files = [
+            file for file in motions_of(results or open_experiment(config).out) if file.is_file()
+        ]
+        if files:
+            return str(files[-1]), [read_trajectory(file) for file in files]
+    return f"the excitation of {settings.criterion}", [design(settings, geometry).trajectory]
 
 
 def write_excitation(

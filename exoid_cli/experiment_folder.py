@@ -62,6 +62,7 @@ def open_experiment(
     from pipelines.settings import Experiment
     from pipelines.workflow.graph import graph
     from pipelines.workflow.imported import with_imported
+    from pipelines.workflow.investigation import with_investigation
 
     file = config or Path(NAME)
     if not config and not in_experiment_folder():
@@ -73,6 +74,7 @@ def open_experiment(
     folder = out or file.parent
     # Imported recordings count as runs, although exoid.toml has no [[run]] for them.
     experiment, imported = with_imported(Experiment.load(file), folder)
+    experiment = with_investigation(experiment, imported, folder)
     if not allow_damaged:
         imported.refuse_damaged()
     steps = graph(experiment, file, folder, imported)

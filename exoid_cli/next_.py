@@ -6,13 +6,15 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from exoid_cli.console import console
-from exoid_cli.excitation import last_excitation, write_excitation
+from exoid_cli.excitation import write_excitation
 from exoid_cli.experiment_folder import settings_in_force
 from exoid_cli.options import ConfigOption
 from exoid_cli.separate import question_of
 
 if TYPE_CHECKING:
     from pipelines.investigation.next_experiments import NextExperiments
+    from pipelines.investigation.separating_design import SeparatingDesign
+    from pipelines.settings import Experiment
 
 
 def next_(
@@ -35,45 +37,65 @@ def next_(
       exoid next
       exoid next diagnosed -o next.parquet
     """
-    from pipelines.investigation.next_experiments import next_experiments
-    from pipelines.mechanics.geometry import Geometry
-    from pipelines.mechanics.read import geometry_from
-
     folder = folder or Path("diagnosed")
     experiment = settings_in_force(config)
-    experiment.mechanism.refuse_all_but_the_leg("`exoid next`")
-    settings, geometry = experiment.design, geometry_from(experiment) or Geometry()
-    rivals, runs = question_of((), folder, experiment, settings)
-    _, last = last_excitation(config, settings, geometry)
-    with console.progress("designing", total=1.0) as report:
-        result = next_experiments(rivals, runs, geometry, last, report)
+    result = compare_experiments(folder, experiment, config)
     best = result.design
     if output and best:
-        mechanism = experiment.sections("mechanism")
-        write_excitation(output, best.design, best.metadata(), geometry, mechanism)
+        write_motion(output, best, experiment)
     elif output:
         console.warn(
-            f"{output}: not written, as no motion within [design.bounds] separates two causes"
+            f"{output}: not written, as no motion within [design.bounds] separates the causes"
         )
     console.emit(
         {
-            "open": [{"cause": one.label, "probability": one.probability} for one in rivals],
+            "open": [{"cause": one.label, "probability": one.probability} for one in result.rivals],
             "experiments": [vars(one) for one in result.experiments],
             "file": str(output) if output and result.design else None,
         }
     )
-    _show(result, output)
+    show_experiments(result)
+    if best:
+        file = output or "-o FILE writes the motion"
+        console.say(
+            f"\n{file}: name it as the trajectory of a run in exoid.toml, and record it;"
+            " `exoid investigate` does both."
+        )
 
 
-def _show(result: "NextExperiments", output: Path | None) -> None:
-    from pipelines.investigation.separation import DECIDED
+def compare_experiments(
+    folder: Path, experiment: "Experiment", config: Path | None
+) -> "NextExperiments":
+    """Return the experiments that could end the doubt of the verdict in a folder."""
+    from pipelines.investigation.next_experiments import next_experiments
+    from pipelines.mechanics.geometry import Geometry
+    from pipelines.mechanics.read import geometry_from
+
+    experiment.mechanism.refuse_all_but_the_leg("`exoid next`")
+    geometry = geometry_from(experiment) or Geometry()
+    question = question_of((), folder, experiment, experiment.design, config)
+    with console.progress("designing", total=1.0) as report:
+        return next_experiments(question.problem, geometry, question.last, report)
+
+
+def write_motion(output: Path, design: "SeparatingDesign", experiment: "Experiment") -> None:
+    """Write the excitation that separates rivals best."""
+    from pipelines.mechanics.geometry import Geometry
+    from pipelines.mechanics.read import geometry_from
+
+    geometry = geometry_from(experiment) or Geometry()
+    mechanism = experiment.sections("mechanism")
+    write_excitation(output, design.design, design.metadata(), geometry, mechanism)
+
+
+def show_experiments(result: "NextExperiments") -> None:
+    """Show what is open, and what would decide it, the best first."""
+    from pipelines.investigation.doubt import DECIDED
     from pipelines.wording.label import in_words
 
-    causes = " or ".join(f"{in_words(one.effect)} ({one.probability:.2f})" for one in result.rivals)
+    named = [(in_words(one.effect) if one.effect else one.label, one) for one in result.rivals]
+    causes = " or ".join(f"{words} ({one.probability:.2f})" for words, one in named)
     console.say(f"Open: {causes}.\n")
     headings = ("experiment", f"decides ({DECIDED:.2f})", "how")
     rows = [(one.what, f"{one.decides:.0%}", one.words) for one in result.experiments]
     console.table(headings, rows, numbers=headings[1])
-    if result.design:
-        file = output or "-o FILE writes the motion"
-        console.say(f"\n{file}: name it as the trajectory of a run in exoid.toml, and record it.")

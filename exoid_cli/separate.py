@@ -1,26 +1,34 @@
 """What ``exoid design --separate`` and ``exoid next`` share: rival causes, and what they show."""
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from exoid_cli.console import console
-from exoid_cli.excitation import show_quality, warn_of_cut, write_excitation
+from exoid_cli.excitation import excitations, show_quality, warn_of_cut, write_excitation
 
 if TYPE_CHECKING:
-    from pipelines.investigation.planned import PlannedRuns
-    from pipelines.investigation.rivals import Rival
     from pipelines.investigation.separation import Separation
+    from pipelines.investigation.separation_problem import SeparationProblem
     from pipelines.mechanics.trajectory import Trajectory
 
-Question = tuple["list[Rival]", "PlannedRuns"]
-"""Rivals, and the runs that are to decide between them."""
+
+@dataclass(frozen=True)
+class Question:
+    """The question which experiment decides between some rivals."""
+
+    problem: "SeparationProblem"
+    last: "Trajectory"
+    """The excitation that was followed last, or else is to be followed."""
+    name: str
+    """Of that one."""
 
 
 def question_of(
-    labels: Sequence[str], verdict: Path | None, experiment: Any, settings: Any
+    labels: Sequence[str], verdict: Path | None, experiment: Any, settings: Any, config: Path | None
 ) -> Question:
-    """Return the rivals that are named, or that a verdict leaves open, and the runs to plan.
+    """Return the question between rivals that are named, or that a verdict leaves open.
 
     Raises
     ------
@@ -31,7 +39,10 @@ def question_of(
     from pipelines.errors import InputError
     from pipelines.investigation.planned import PlannedRuns
     from pipelines.investigation.rivals import rivals_in_verdict, rivals_named
+    from pipelines.investigation.separation_problem import SeparationProblem
+    from pipelines.mechanics.geometry import Geometry
     from pipelines.mechanics.machine import THE_LEG
+    from pipelines.mechanics.read import geometry_from
 
     known = tuple(experiment.diagnose.known)
     runs = PlannedRuns(settings, usual_plant(experiment.mechanism), known=known)
@@ -47,12 +58,18 @@ def question_of(
                 f"{rival.label} is in diagnose.known, and so part of the model that all causes"
                 " share; remove it there, or separate other causes"
             )
-    return rivals, runs
+    # The diagnosed recordings lie where the experiment's other results are.
+    results = verdict.resolve().parent if verdict else None
+    geometry = geometry_from(experiment) or Geometry()
+    name, motions = excitations(config, settings, geometry, results)
+    if verdict is not None:
+        runs = runs.after(motions)
+    return Question(SeparationProblem.of(rivals, runs, motions[-1]), motions[-1], name)
 
 
 def show_separation(title: str, separation: "Separation") -> None:
     """Show the posterior to expect under each truth."""
-    from pipelines.investigation.separation import DECIDED
+    from pipelines.investigation.doubt import DECIDED
 
     document = separation.as_json()
     labels = [one["cause"] for one in document["rivals"]]
@@ -68,24 +85,14 @@ def show_separation(title: str, separation: "Separation") -> None:
     console.table(("if it is", *headings), rows, numbers=", ".join(headings))
 
 
-def evaluate_separation(
-    file: Path,
-    settings: Any,
-    geometry: Any,
-    question: Question,
-    last: "tuple[str, Trajectory]",
-) -> None:
+def evaluate_separation(file: Path, settings: Any, geometry: Any, question: Question) -> None:
     """Show how well an excitation separates rival causes."""
     from pipelines.design.quality import quality
-    from pipelines.investigation.separating_design import separation, separation_of_last
     from pipelines.mechanics.trajectory import read_trajectory
 
     trajectory = read_trajectory(file)
     result = quality(trajectory, settings, geometry)
-    rivals, runs = question
-    # As large as in the last excitation, as a design supposes them.
-    before = separation_of_last(rivals, runs, last[1])
-    separated = separation(before.rivals, runs, trajectory)
+    separated = question.problem.with_motion(trajectory)
     document = {"separation": separated.as_json()}
     console.emit({"file": str(file), **result.as_metadata(), **document})
     show_quality(str(file), result)
@@ -94,26 +101,22 @@ def evaluate_separation(
 
 
 def design_separation(
-    output: Path,
-    question: "Question",
-    geometry: Any,
-    last: "tuple[str, Trajectory]",
-    mechanism: dict[str, Any],
+    output: Path, question: Question, geometry: Any, mechanism: dict[str, Any]
 ) -> None:
     """Design an excitation that separates rival causes, and write it."""
-    from pipelines.investigation.separating_design import separating_design, separation_of_last
+    from pipelines.investigation.separating_design import separating_design
 
-    rivals, runs = question
-    before = separation_of_last(rivals, runs, last[1])
     with console.progress("designing", total=1.0) as report:
-        result = separating_design(before, runs, geometry, report)
+        result = separating_design(question.problem, geometry, question.last, report)
     write_excitation(output, result.design, result.metadata(), geometry, mechanism)
     warn_of_cut(result.design)
     console.emit({"file": str(output), **result.metadata()})
     show_quality(str(output), result.design.quality)
-    show_separation(f"With {last[0]}", result.before)
+    show_separation(f"With {question.name}", result.before)
     show_separation("With this one", result.separation)
+    for one, other in result.inseparable:
+        console.warn(f"no motion separates {one} and {other}; `exoid next` lists tests by hand")
     console.say(
-        f"\n{output}: expected log odds of the worst pair {result.separation.least():.3g};"
+        f"\n{output}: expected log odds of the worst pair {result.least:.3g};"
         f" stopped by {result.design.stopped_by}"
     )

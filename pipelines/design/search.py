@@ -14,6 +14,7 @@ from pipelines.errors import NotIdentifiable
 from pipelines.mechanics.fourier import FourierTrajectory
 from pipelines.mechanics.geometry import Geometry
 from pipelines.mechanics.limits import bounds_array
+from pipelines.mechanics.trajectory import Trajectory
 from pipelines.settings.design import DesignSettings
 
 Report = Callable[[float, str], None]
@@ -225,3 +226,18 @@ def trajectory_of(candidate: NDArray, problem: Problem) -> FourierTrajectory:
     return FourierTrajectory(
         theta0.copy(), coefficients[0], coefficients[1], float(problem.speeds[0])
     )
+
+
+def candidate_of(trajectory: Trajectory, problem: Problem) -> NDArray | None:
+    """Return the candidate (D,) whose excitation comes closest to a trajectory.
+
+    None where it is no Fourier series of the search's frequencies.
+    """
+    speeds = problem.speeds
+    if not isinstance(trajectory, FourierTrajectory) or trajectory.a.shape != (2, len(speeds)):
+        return None
+    if not np.isclose(trajectory.omega, speeds[0]):
+        return None
+    parts = zip((trajectory.a, trajectory.b), problem.basis, strict=True)
+    coordinates = np.concatenate([(part @ basis).ravel() for part, basis in parts])
+    return np.append(coordinates, trajectory.theta0) if problem.theta0_is_free else coordinates

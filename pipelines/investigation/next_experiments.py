@@ -1,21 +1,14 @@
 """Which experiment would end the doubt of a verdict, and how probably."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
-
-import numpy as np
+from dataclasses import dataclass
 
 from pipelines.design.search import Report
 from pipelines.errors import NotIdentifiable
-from pipelines.investigation.planned import PlannedRuns
+from pipelines.investigation.doubt import DECIDED
 from pipelines.investigation.rivals import Rival
-from pipelines.investigation.separating_design import (
-    SeparatingDesign,
-    separating_design,
-    separation,
-    separation_of_last,
-)
-from pipelines.investigation.separation import DECIDED, Separation, decided
+from pipelines.investigation.separating_design import SeparatingDesign, separating_design
+from pipelines.investigation.separation_problem import SeparationProblem
 from pipelines.mechanics.geometry import Geometry
 from pipelines.mechanics.trajectory import Trajectory
 
@@ -42,8 +35,7 @@ class NextExperiments:
 
 
 def next_experiments(
-    rivals: Sequence[Rival],
-    runs: PlannedRuns,
+    problem: SeparationProblem,
     geometry: Geometry,
     last: Trajectory,
     report: Report = lambda done, note: None,
@@ -52,10 +44,8 @@ def next_experiments(
 
     Parameters
     ----------
-    rivals : sequence of Rival
-        Two or more, with the probabilities of a verdict.
-    runs : PlannedRuns
-        As those of the verdict.
+    problem : SeparationProblem
+        Two rivals or more with the probabilities of a verdict, and runs as it had.
     geometry : Geometry
         Lengths and gravity.
     last : Trajectory
@@ -63,31 +53,28 @@ def next_experiments(
     report : callable, optional
         Called with the share that is done, 0 to 1, and a note.
     """
-    again = separation_of_last(rivals, runs, last)
-    experiments = [NextExperiment("repeat", "record the same motion again", _decides(again))]
+    rivals = [sized.rival for sized in problem.rivals]
+    again = problem.with_motion(last)
+    experiments = [NextExperiment("repeat", "record the same motion again", again.decides())]
     design: SeparatingDesign | None = None
     words, decides = "record another motion, which separates the causes best", 0.0
     try:
-        design = separating_design(again, runs, geometry, report)
-        decides = _decides(design.separation)
+        design = separating_design(problem, geometry, last, report)
+        decides = design.separation.decides()
+        words += "".join(f"; none separates {one} and {other}" for one, other in design.inseparable)
     except NotIdentifiable:
-        words = "no motion within [design.bounds] separates two of them"
+        words = "no motion within [design.bounds] separates them"
     experiments.append(NextExperiment("motion", words, decides))
-    for kind in {"exo_alone", "with_human"} - set(runs.kinds):
-        other = separation(again.rivals, replace(runs, kinds=(kind,)), last)
-        experiments.append(NextExperiment("run", f"record {kind} runs, too", _decides(other)))
+    for kind in {"exo_alone", "with_human"} - set(problem.runs.kinds):
+        other = problem.with_motion(last, (kind,))
+        experiments.append(NextExperiment("run", f"record {kind} runs, too", other.decides()))
     for rival in rivals:
-        decides = _decides_by_hand(rival, rivals)
-        experiments.append(NextExperiment("test", rival.effect.confirm, decides))
+        if rival.effect:
+            decides = _decides_by_hand(rival, rivals)
+            experiments.append(NextExperiment("test", rival.effect.confirm, decides))
     # Of equal ones the first is the least work.
     ordered = sorted(experiments, key=lambda one: -round(one.decides, 2))
     return NextExperiments(tuple(rivals), tuple(ordered), design)
-
-
-def _decides(separated: Separation) -> float:
-    """Return the probability that an experiment decides for the true cause, over all truths."""
-    prior = np.array([one.rival.probability for one in separated.rivals])
-    return float(prior @ decided(separated.posterior()))
 
 
 def _decides_by_hand(rival: Rival, rivals: Sequence[Rival]) -> float:

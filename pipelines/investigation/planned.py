@@ -33,6 +33,9 @@ class PlannedRuns:
     """Labels of effects that the machine is known to have."""
     noise_nm: tuple[float, float] | None = None
     """Noise behind the regression filter as it was measured; by default that of the settings."""
+    diagnosed: tuple[Trajectory, ...] = ()
+    """Motions of the runs that a diagnosis had, to which these are added."""
+    diagnosed_kinds: tuple[str, ...] = ()
 
     def as_in_verdict(self, folder: Path) -> "PlannedRuns":
         """Return runs of the kinds, and with the noise, of a diagnosis.
@@ -52,25 +55,44 @@ class PlannedRuns:
             )
         return replace(self, kinds=tuple(verdict.runs), noise_nm=(noise["hip"], noise["knee"]))
 
-    def problem(self, trajectory: Trajectory, effects: Sequence[Effect]) -> DetectionProblem:
-        """Return the detection problem of the runs.
+    def after(self, motions: Sequence[Trajectory]) -> "PlannedRuns":
+        """Return runs that are added to diagnosed ones of the same kinds, with some motions."""
+        return replace(self, diagnosed=tuple(motions), diagnosed_kinds=self.kinds)
+
+    def problem(self, motion: Trajectory, effects: Sequence[Effect]) -> DetectionProblem:
+        """Return the detection problem of the diagnosed runs, if any, and those with a motion.
 
         Where no effect depends on time, one period counts as often as it is repeated.
 
         Parameters
         ----------
-        trajectory : Trajectory
+        motion : Trajectory
             Of hip and knee.
         effects : sequence of Effect
             Those that the runs are to show.
         """
+        earlier = [(one, self.diagnosed_kinds) for one in self.diagnosed]
+        return self._problem([*earlier, (motion, self.kinds)], effects)
+
+    def diagnosed_problem(self, effects: Sequence[Effect]) -> DetectionProblem:
+        """Return the detection problem of the diagnosed runs alone."""
+        return self._problem([(one, self.diagnosed_kinds) for one in self.diagnosed], effects)
+
+    def _problem(
+        self, planned: Sequence[tuple[Trajectory, tuple[str, ...]]], effects: Sequence[Effect]
+    ) -> DetectionProblem:
         noise, rate_hz = self.settings.noise, self.settings.sample_rate_hz
-        period_s, repeats = trajectory.period_s, 1.0
+        periods, repeats = {motion.period_s for motion, _ in planned}, 1.0
+        period_s = periods.pop() if len(periods) == 1 else None
         if period_s and period_s < noise.duration_s and not any(map(_depends_on_time, effects)):
             repeats = noise.duration_s / period_s
             noise = noise.model_copy(update={"duration_s": period_s})
-        motions = planned_motions(trajectory, self.plant, noise, self.kinds, rate_hz)
-        observed = [observe(motion) for motion in motions]
+        motions = [
+            run
+            for motion, kinds in planned
+            for run in planned_motions(motion, self.plant, noise, kinds, rate_hz)
+        ]
+        observed = [observe(run) for run in motions]
         baseline = baseline_of(observed, known_effects(self.known, motions[0].machine))
         floor = planned_noise(noise, rate_hz, observed[0].block)
         rms = floor.rms if self.noise_nm is None else np.array([*self.noise_nm, np.nan, np.nan])

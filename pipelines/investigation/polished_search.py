@@ -13,7 +13,14 @@ from pipelines.design.evolution import polish
 from pipelines.design.excitation import Design
 from pipelines.design.fitness import costs
 from pipelines.design.quality import quality
-from pipelines.design.search import Report, first_swarm, search_problem, spread_of, trajectory_of
+from pipelines.design.search import (
+    Report,
+    candidate_of,
+    first_swarm,
+    search_problem,
+    spread_of,
+    trajectory_of,
+)
 from pipelines.mechanics.geometry import Geometry
 from pipelines.mechanics.trajectory import Trajectory
 from pipelines.settings.design import DesignSettings
@@ -27,7 +34,8 @@ def polished_search(
     geometry: Geometry,
     cost: Cost,
     report: Report,
-    check: Callable[[Trajectory], None] = lambda start: None,
+    check: Callable[[Trajectory], None] = lambda motion: None,
+    last: Trajectory | None = None,
     least_gain: float = 3e-4,
 ) -> Design:
     """Return the best excitation.
@@ -45,7 +53,9 @@ def polished_search(
     report : callable
         Called with the share that is done, 0 to 1, and a note.
     check : callable, optional
-        May refuse the best motion of the first swarm.
+        Called first, with the motion of the largest log det in the first swarm; may refuse.
+    last : Trajectory, optional
+        Of the last experiment: where the search can find it, its result is no worse.
     least_gain : float, optional
         Relative gain within ``patience`` generations below which the search stagnates.
     """
@@ -67,18 +77,30 @@ def polished_search(
         return np.array([value for value, _ in judged])
 
     swarm = first_swarm(settings, problem, spread, rng)
-    start = swarm.position[np.argmin(costs_of(swarm.position))]
-    check(trajectory_of(start, problem))
-    done = 0.5
-    best, _ = polish(
-        start,
-        0.1 * spread,
-        costs_of,
-        rng,
-        out_of_time=lambda: time.monotonic() > deadline,
-        patience=patience,
-        least_gain=least_gain,
-    )
+    check(trajectory_of(swarm.position[np.argmin(costs(swarm.position, problem))], problem))
+    # Scales of the first steps: a motion that an earlier search has found is near its optimum.
+    far, near = 0.1, 0.02
+    starts = [(swarm.position[np.argmin(costs_of(swarm.position))], far)]
+    if last and (again := candidate_of(last, problem)) is not None:
+        starts.append((again, near))
+    best, best_cost = starts[0][0], np.inf
+    for i, (start, scale) in enumerate(starts):
+        done = 0.5 * (1.0 + i / len(starts))
+        # The start itself counts, which none of its neighbours may reach.
+        for found, value in (
+            (start, float(costs_of(start[np.newaxis])[0])),
+            polish(
+                start,
+                scale * spread,
+                costs_of,
+                rng,
+                out_of_time=lambda: time.monotonic() > deadline,
+                patience=patience,
+                least_gain=least_gain,
+            ),
+        ):
+            if value < best_cost:
+                best, best_cost = found, value
     stopped_by = "seconds" if time.monotonic() > deadline else "stagnation"
     trajectory = trajectory_of(best, problem)
     return Design(trajectory, quality(trajectory, settings, geometry), settings, stopped_by)

@@ -1,10 +1,9 @@
 """The excitation that separates rival causes best.
 
-The expected log odds of the worst pair are maximized, up to the value from which the pair is
-decided in nearly every experiment. From there on the parameters count, by log det.
+The expected log loss of the posterior is minimized: the pair that is worst separated counts most,
+and one that is decided, or that no motion separates, no longer.
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -13,16 +12,14 @@ import numpy as np
 from pipelines.design.excitation import Design
 from pipelines.design.search import Report
 from pipelines.errors import NotIdentifiable
-from pipelines.investigation.planned import PlannedRuns
 from pipelines.investigation.polished_search import polished_search
-from pipelines.investigation.rivals import Rival, SizedRival, sized
-from pipelines.investigation.separation import Separation
+from pipelines.investigation.separation import Pair, Separation
+from pipelines.investigation.separation_problem import SeparationProblem
 from pipelines.mechanics.geometry import Geometry
 from pipelines.mechanics.trajectory import Trajectory
 
-SURELY_DECIDED = 23.5
-"""Expected log odds m from which all but one in a thousand experiments decide: their standard
-deviation is the root of 2 m, and m less three of it is the log odds of ``DECIDED``."""
+OF_PARAMETERS = 1e-3
+"""Log loss that one of log det is worth: where causes are decided, the parameters count."""
 
 
 @dataclass(frozen=True)
@@ -33,95 +30,72 @@ class SeparatingDesign:
     separation: Separation
     before: Separation
     """The same for the last excitation."""
+    inseparable: tuple[Pair, ...]
+    """Pairs of rivals that no motion separates."""
+
+    @property
+    def least(self) -> float:
+        """The least of the expected log odds, of the pairs that this motion separates."""
+        return self.separation.least(self.separation.separable())
 
     def metadata(self) -> dict[str, Any]:
         """Return the metadata of the excitation's file."""
         return self.design.metadata() | {
             "criterion": "separation",
-            "criterion_value": self.separation.least(),
+            "criterion_value": self.least,
+            "decides": self.separation.decides(),
             "separation": self.separation.as_json(),
             "separation_before": self.before.as_json(),
+            "inseparable": [list(pair) for pair in self.inseparable],
         }
 
 
 def separating_design(
-    before: Separation,
-    runs: PlannedRuns,
+    problem: SeparationProblem,
     geometry: Geometry,
+    last: Trajectory,
     report: Report = lambda done, note: None,
 ) -> SeparatingDesign:
     """Design the excitation that separates rivals best.
 
-    Equal settings give an equal excitation, unless ``seconds`` ended the search.
+    Equal settings give an equal excitation, unless ``seconds`` ended the search. Pairs that no
+    motion separates are left to other experiments, and do not count.
 
     Parameters
     ----------
-    before : Separation
-        Of the excitation that did not separate them, or a usual one.
-    runs : PlannedRuns
-        With the settings of the search.
+    problem : SeparationProblem
+        Rivals, and runs with the settings of the search.
     geometry : Geometry
         Lengths and gravity.
+    last : Trajectory
+        The excitation that did not separate them, or a usual one.
     report : callable, optional
         Called with the share that is done, 0 to 1, and a note.
 
     Raises
     ------
     NotIdentifiable
-        Where no motion within the bounds separates two of them.
+        Where no motion within the bounds separates any two of them.
     """
-    design = _search(before.rivals, runs, geometry, report)
-    return SeparatingDesign(design, separation(before.rivals, runs, design.trajectory), before)
+    least_loss, inseparable = np.inf, list[Pair]()
 
+    def cost(motion: Trajectory, log_det: float) -> tuple[float, str]:
+        nonlocal least_loss
+        loss = problem.with_motion(motion).log_loss()
+        least_loss = min(least_loss, loss)
+        return loss - OF_PARAMETERS * log_det, f"log loss {least_loss:.3g}"
 
-def separation_of_last(rivals: Sequence[Rival], runs: PlannedRuns, last: Trajectory) -> Separation:
-    """Return how well the runs with the last excitation separate rivals, which it sizes.
-
-    Raises
-    ------
-    InputError
-        Where such runs cannot show a rival.
-    """
-    problem = runs.problem(last, [one.effect for one in rivals])
-    return Separation.of(sized(rivals, problem), problem)
-
-
-def separation(
-    rivals: Sequence[SizedRival], runs: PlannedRuns, trajectory: Trajectory
-) -> Separation:
-    """Return how well the runs with a trajectory separate rivals."""
-    effects = [sized.rival.effect for sized in rivals]
-    return Separation.of(rivals, runs.problem(trajectory, effects))
-
-
-def _search(
-    rivals: Sequence[SizedRival], runs: PlannedRuns, geometry: Geometry, report: Report
-) -> Design:
-    """Return the excitation of the largest expected log odds."""
-    best_odds = -np.inf
-
-    def cost(trajectory: Trajectory, log_det: float) -> tuple[float, str]:
-        nonlocal best_odds
-        separated = separation(rivals, runs, trajectory)
-        best_odds = max(best_odds, separated.least())
-        return _cost(separated, log_det), f"log odds {best_odds:.3g}"
-
-    def refuse_inseparable(start: Trajectory) -> None:
-        if inseparable := separation(rivals, runs, start).inseparable():
+    def refuse_inseparable(motion: Trajectory) -> None:
+        separated = problem.with_motion(motion)
+        inseparable.extend(separated.inseparable())
+        if not separated.separable().any():
             one, other = inseparable[0]
             raise NotIdentifiable(
                 f"no motion within [design.bounds] separates {one} and {other}: each makes the"
-                " torque of the other. Leave one out; another sensor or a test by hand may decide"
+                " torque of the other; another sensor or a test by hand may decide"
             )
 
-    return polished_search(runs.settings, geometry, cost, report, refuse_inseparable)
-
-
-def _cost(separated: Separation, log_det: float) -> float:
-    """Return what the search minimizes."""
-    # A pair that no motion changes leaves the search to the others. A tenth of a log odds is worth
-    # one of log det.
-    of_others, of_parameters = 1e-3, 0.1
-    odds = np.minimum(separated.log_odds(), SURELY_DECIDED)
-    worst = odds[~np.eye(len(odds), dtype=bool)].min()
-    return -float(worst + of_others * odds.mean() + of_parameters * log_det)
+    settings = problem.runs.settings
+    design = polished_search(settings, geometry, cost, report, refuse_inseparable, last, 3e-3)
+    separated, before = problem.with_motion(design.trajectory), problem.with_motion(last)
+    return SeparatingDesign(design, separated, before, tuple(inseparable))

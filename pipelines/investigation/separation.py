@@ -9,11 +9,15 @@ of it. The log likelihood of A then exceeds that of B by half of
 in the mean (T-optimality: Atkinson and Fedorov, 1975, Biometrika 62(1)). Each amplitude costs half
 the logarithm of the independent samples. As in a diagnosis, no form is exact: an output counts less
 where causes explain more of it.
+
+After a diagnosis the rows are those of its runs and of further ones. What the former showed is
+known, and is in the probabilities of the rivals: only the difference of both log likelihoods
+counts. If nothing is missing, the further runs do not show again what noise seemed to show.
 """
 
 import itertools
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -23,12 +27,12 @@ from scipy.special import logsumexp
 from pipelines.diagnosis.criteria import CRITERIA
 from pipelines.diagnosis.detectability.detectability import NEVER_APART
 from pipelines.diagnosis.detectability.detection_problem import DetectionProblem
-from pipelines.diagnosis.detectability.directions import orthonormal
 from pipelines.diagnosis.selection.marginal_likelihood import power
-from pipelines.investigation.rivals import Appearance, SizedRival, unit_torque
+from pipelines.investigation.doubt import DECIDED
+from pipelines.investigation.sized_rival import Appearance, SizedRival
 
-DECIDED = 0.95
-"""Posterior probability of one rival from which the others are excluded."""
+Pair = tuple[str, str]
+"""Labels of two rivals."""
 
 
 @dataclass(frozen=True)
@@ -36,17 +40,30 @@ class Separation:
     """How well some runs separate R rivals."""
 
     rivals: tuple[SizedRival, ...]
-    truths: tuple[tuple[Appearance, ...], ...]
-    """Each rival as the true cause, at its probable shapes."""
+    truths: tuple[NDArray, ...]
+    """Torque of each rival as the true cause, (n, rows), at its n probable shapes."""
+    spreads: tuple[NDArray, ...]
+    """Standard deviation of that torque in further runs, (n, rows), as earlier ones have noise."""
     shapes: tuple[tuple[Appearance, ...], ...]
     """Each rival at all shapes with which it could explain another one."""
     price: float
-    """Log likelihood that each amplitude costs."""
+    """Log likelihood that an amplitude costs which no earlier run shows."""
     noise: NDArray
-    """(rows,) its standard deviation; below one where the model's error counts."""
+    """(rows,) its standard deviation; below one where the model's error counts, and zero in runs
+    that were diagnosed: what they showed is known."""
+    seen: NDArray
+    """(rows,) what the runs show of the first cause, unweighted."""
+    earlier: "Separation | None"
+    """The same in the diagnosed runs alone, whose result is the rivals' probability."""
 
     @classmethod
-    def of(cls, rivals: Sequence[SizedRival], problem: DetectionProblem) -> "Separation":
+    def of(
+        cls,
+        rivals: Sequence[SizedRival],
+        problem: DetectionProblem,
+        earlier: "Separation | None" = None,
+        diagnosed: int = 0,
+    ) -> "Separation":
         """Compute how the rivals look in a detection problem's rows.
 
         Parameters
@@ -54,72 +71,138 @@ class Separation:
         rivals : sequence of SizedRival
         problem : DetectionProblem
             Planned or recorded runs.
+        earlier : Separation, optional
+            Of the runs that were diagnosed.
+        diagnosed : int, optional
+            How many of the problem's runs, the first ones, these are.
         """
+        truths = [[truth.torque(problem) for truth in sized.truths] for sized in rivals]
         # The mean over all truths: the rivals stand for one torque.
-        squares = np.mean(
-            [
-                (amplitude * unit_torque(candidate, problem)) ** 2
-                for sized in rivals
-                for candidate, amplitude in sized.truths
-            ],
-            axis=0,
-        )
+        squares = np.mean(np.square(list(itertools.chain(*truths))), axis=0)
         explained = np.bincount(problem.outputs, squares, minlength=len(problem.root))
         weights = power(explained, 1.0, CRITERIA.model_error)
         weighted = problem.weighted(weights)
-        looks = [{one: Appearance.of(one, weighted) for one in sized.shapes} for sized in rivals]
-        truths = (
-            tuple(
-                replace(own[candidate], torque=amplitude * own[candidate].torque)
-                for candidate, amplitude in sized.truths
-            )
-            for sized, own in zip(rivals, looks, strict=True)
+        seen = next(itertools.chain(*truths))
+        nothing = _of_nothing(earlier.seen if earlier else seen, weights, weighted)
+        counts = (int(run.usable.sum()) for run in problem.runs)
+        is_planned = np.concatenate([np.full(n, r >= diagnosed) for r, n in enumerate(counts)])
+        no_span = Appearance(np.zeros((len(is_planned), 0)))
+        of_truths = tuple(
+            np.array([truth.torque(weighted) for truth in sized.truths] or [nothing])
+            for sized in rivals
         )
+        spreads = tuple(np.zeros_like(own) for own in of_truths)
+        if earlier:
+            for own, known, sized in zip(spreads, earlier.truths, rivals, strict=True):
+                for row, before, truth in zip(own, known, sized.truths, strict=False):
+                    row += truth.torque(weighted, diagnosed) / np.sqrt(_squared(before))
         return cls(
             tuple(rivals),
-            tuple(truths),
-            tuple(tuple(own.values()) for own in looks),
+            of_truths,
+            spreads,
+            tuple(
+                tuple(Appearance.of(shape, weighted) for shape in sized.shapes) or (no_span,)
+                for sized in rivals
+            ),
             0.5 * float(np.log(problem.independent)),
-            np.sqrt(weights[problem.outputs]),
+            is_planned * np.sqrt(weights[problem.outputs]),
+            seen,
+            earlier,
         )
 
     @property
     def labels(self) -> list[str]:
-        """Of the rivals, ``effect@joint``."""
+        """Of the rivals, ``effect@joint`` or ``nothing``."""
         return [sized.rival.label for sized in self.rivals]
 
     def log_odds(self) -> NDArray:
-        """Return the expected log odds (R, R) of each truth against each rival, priors apart.
+        """Return the expected log odds of each truth against each rival, (R, R), priors apart.
 
         The mean over the truth's shapes; of the rival, the shape counts that is most alike.
+        Diagnosed runs only add to what the others show.
         """
-        odds = np.zeros((len(self.rivals), len(self.rivals)))
-        for i, of_truth in enumerate(self.truths):
-            for j, of_rival in enumerate(self.shapes):
-                if i != j:
-                    odds[i, j] = np.mean([self._against(one, of_rival) for one in of_truth])
-        return odds
+        return self._odds(priced=True)
 
-    def least(self) -> float:
-        """Return the least of the expected log odds: the worst pair counts."""
-        odds = self.log_odds()
-        return float(np.min(odds[~np.eye(len(odds), dtype=bool)]))
+    def distances(self) -> NDArray:
+        """Return what T-optimality maximizes, (R, R): the log odds where amplitudes cost nothing.
 
-    def inseparable(self) -> list[tuple[str, str]]:
+        A motion that shows nothing of causes which hardly show may improve their log odds.
+        """
+        return self._odds(priced=False)
+
+    def _odds(self, priced: bool) -> NDArray:
+        result = np.zeros((len(self.rivals), len(self.rivals)))
+        for i, j in itertools.permutations(range(len(self.rivals)), 2):
+            prices = self.prices(j) if priced else np.zeros(len(self.shapes[j]))
+            own = self.prices(i).min() if priced else 0.0
+            result[i, j] = np.mean(
+                [_against(one, self.shapes[j], prices) for one in self.truths[i]]
+            )
+            result[i, j] -= own
+        return result if self.earlier is None else result - self.earlier._odds(priced=False)
+
+    def log_loss(self) -> float:
+        """Return the expected log loss of the posterior, bounded pair by pair.
+
+        Log odds have the variance of twice their mean. Of each truth the expected logarithms of
+        one plus the odds against it are added up, for each rival. What a rival costs is left out.
+        """
+        nodes, parts = np.polynomial.hermite_e.hermegauss(15)
+        parts /= parts.sum()
+        prior = np.array([sized.rival.probability for sized in self.rivals])
+        mean = np.maximum(self.distances(), 0.0)[:, :, np.newaxis]
+        against = np.log(prior[np.newaxis, :] / prior[:, np.newaxis])[:, :, np.newaxis]
+        odds = mean + np.sqrt(2.0 * mean) * nodes - against
+        losses = np.logaddexp(0.0, -odds) @ parts
+        return float(prior @ (losses * ~np.eye(len(prior), dtype=bool)).sum(axis=1))
+
+    def prices(self, rival: int) -> NDArray:
+        """Return the log likelihood that the amplitudes of each shape of a rival cost, (shapes,).
+
+        Earlier runs have paid for them, but for what further runs know better.
+        """
+        widths = np.array([one.span.shape[1] for one in self.shapes[rival]])
+        if self.earlier is None:
+            return self.price * widths
+        pairs = zip(self.shapes[rival], self.earlier.shapes[rival], strict=True)
+        known_better = np.array([now.log_size - before.log_size for now, before in pairs])
+        return np.clip(known_better, 0.0, self.price * widths)
+
+    def separable(self) -> NDArray:
+        """Return whether each rival leaves a part of each truth unexplained, (R, R).
+
+        A law with another one as a part explains that one in every motion.
+        """
+        every = range(len(self.rivals))
+        shares = [[self._share(i, j) if i != j else 0.0 for j in every] for i in every]
+        return np.array(shares) >= NEVER_APART
+
+    def inseparable(self) -> list[Pair]:
         """Return the pairs of rivals of which each explains nearly all of the other's torque."""
+        separable = self.separable()
         pairs = itertools.combinations(range(len(self.rivals)), 2)
         return [
             (self.labels[i], self.labels[j])
             for i, j in pairs
-            if max(self._share(i, j), self._share(j, i)) < NEVER_APART
+            if not (separable[i, j] or separable[j, i])
         ]
+
+    def least(self, counts: NDArray) -> float:
+        """Return the least of the expected log odds: the worst pair counts.
+
+        Parameters
+        ----------
+        counts : (R, R) array
+            Which pairs of a truth and a rival count, as ``separable`` returns them.
+        """
+        return float(np.min(self.log_odds()[counts]))
 
     def _share(self, i: int, j: int) -> float:
         """Return the largest share of a truth's power that a rival does not explain."""
         shares = (
-            min(1.0 - _squared(rival.span.T @ truth.torque) / whole for rival in self.shapes[j])
+            min(1.0 - _squared(rival.span.T @ truth) / whole for rival in self.shapes[j])
             for truth in self.truths[i]
-            if (whole := _squared(truth.torque)) > 0.0
+            if (whole := _squared(truth)) > 0.0
         )
         return max(shares, default=0.0)
 
@@ -136,14 +219,10 @@ class Separation:
             "decided": decided(posterior).tolist(),
         }
 
-    def _against(self, truth: Appearance, rivals: Sequence[Appearance]) -> float:
-        """Return the expected log odds of a truth against the rival shape that is most alike."""
-        of_truth, width = _squared(truth.torque), truth.span.shape[1]
-        return min(
-            0.5 * float(of_truth - _squared(rival.span.T @ truth.torque))
-            + self.price * (rival.span.shape[1] - width)
-            for rival in rivals
-        )
+    def decides(self) -> float:
+        """Return the probability that the true rival has ``DECIDED`` afterwards."""
+        prior = np.array([sized.rival.probability for sized in self.rivals])
+        return float(prior @ decided(self.posterior()))
 
     def posterior(self, draws: int = 400, seed: int = 1) -> NDArray:
         """Simulate the experiment and return the posteriors of all rivals under each truth.
@@ -161,28 +240,55 @@ class Separation:
             Truth, experiment, rival.
         """
         rng = np.random.default_rng(seed)
-        flat = [shape for own in self.shapes for shape in own]
-        # Only the part of the rows that some rival can explain distinguishes them.
-        basis = orthonormal(np.hstack([shape.span for shape in flat]))
-        spans = [[basis.T @ shape.span for shape in own] for own in self.shapes]
         prior = np.log([sized.rival.probability for sized in self.rivals])
-        prices = np.array([self.price * own[0].shape[1] for own in spans])
+        prices = [self.prices(j) for j in range(len(self.rivals))]
         result = np.zeros((len(self.rivals), draws, len(self.rivals)))
         for i, own in enumerate(self.truths):
-            torques = np.array([basis.T @ shape.torque for shape in own])
-            noise = rng.standard_normal((draws, len(self.noise))) * self.noise
-            y = torques[np.arange(draws) % len(own)] + noise @ basis
-            # Power that each shape of each rival explains, (shapes, draws).
-            explained = [np.array([_squared(y @ q) for q in of_rival]) for of_rival in spans]
-            evidence = np.array(
-                [
-                    logsumexp(0.5 * of_rival, axis=0) - np.log(len(of_rival))
-                    for of_rival in explained
-                ]
-            )
-            log = evidence.T + prior - prices
+            of_draw = np.arange(draws) % len(own)
+            spread = rng.standard_normal((draws, 1)) * self.spreads[i][of_draw]
+            y = own[of_draw] + spread + rng.standard_normal((draws, len(self.noise))) * self.noise
+            log = self._evidence(y, prices) + prior
+            if self.earlier:
+                free = [np.zeros(len(own)) for own in self.shapes]
+                log -= self.earlier._evidence(self.earlier.truths[i], free)[of_draw]
             result[i] = np.exp(log - logsumexp(log, axis=1, keepdims=True))
         return result
+
+    def _evidence(self, y: NDArray, prices: Sequence[NDArray]) -> NDArray:
+        """Return the log likelihood of each rival, (n, R), over its shapes, in rows (n, rows)."""
+        of_rivals = [
+            logsumexp(
+                [
+                    0.5 * _squared(y @ one.span) - price
+                    for one, price in zip(own, costs, strict=True)
+                ],
+                axis=0,
+            )
+            - np.log(len(own))
+            for own, costs in zip(self.shapes, prices, strict=True)
+        ]
+        return np.array(of_rivals).T
+
+
+def _of_nothing(seen: NDArray, weights: NDArray, weighted: DetectionProblem) -> NDArray:
+    """Return what runs show if nothing is missing, (rows,).
+
+    By chance, the diagnosed runs have shown what each of the causes would have made; the further
+    ones show nothing.
+    """
+    rows = np.zeros(len(weighted.outputs))
+    rows[: len(seen)] = seen
+    rows *= np.sqrt(weights[weighted.outputs])
+    return rows - weighted.basis @ (weighted.basis.T @ rows)
+
+
+def _against(truth: NDArray, rivals: Sequence[Appearance], prices: NDArray) -> float:
+    """Return the expected log odds of a truth against the rival shape that is most alike."""
+    of_truth = _squared(truth)
+    return min(
+        0.5 * float(of_truth - _squared(rival.span.T @ truth)) + price
+        for rival, price in zip(rivals, prices, strict=True)
+    )
 
 
 def decided(posterior: NDArray) -> NDArray:

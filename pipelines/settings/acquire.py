@@ -1,6 +1,6 @@
 """``[acquire]`` and ``[[run]]``: how runs are recorded, and which."""
 
-from typing import Literal
+from typing import Literal, Self
 
 from pydantic import Field
 
@@ -23,3 +23,17 @@ class RunSettings(Settings):
     duration_s: Positive = Field(40.0, description="Length without ramps, best in whole periods.")
     trajectory: str | None = Field(None, description="Its own excitation file; else the design's.")
     seed: int = Field(0, ge=0, description="Seed of a virtual rig's noise.")
+
+    def repeated(self, step: int) -> Self:
+        """Return the run ``NAME+STEP``, which repeats it along the motion of a further step."""
+        # A virtual rig's noise differs, as it does between any two runs.
+        seed = self.seed + 1000 * step
+        return self.model_copy(
+            update={"name": f"{self.name}+{step}", "trajectory": None, "seed": seed}
+        )
+
+    @property
+    def step(self) -> int:
+        """The step of an investigation that it belongs to; 0 for a run of exoid.toml."""
+        step = self.name.partition("+")[2]
+        return int(step) if step.isdecimal() else 0

@@ -12,6 +12,7 @@ from pipelines.settings.design import DesignSettings
 from pipelines.settings.diagnose import DiagnoseSettings
 from pipelines.settings.filter import FilterSettings
 from pipelines.settings.identify import IdentifySettings
+from pipelines.settings.investigate import InvestigateSettings
 from pipelines.settings.mechanism import MechanismSettings
 from pipelines.settings.simulate import SimulateSettings
 from pipelines.validation.suggestion import similar_file, suggestion
@@ -37,6 +38,9 @@ class Experiment(Settings):
     filter: FilterSettings = Field(FilterSettings(), description="Filtering.")
     identify: IdentifySettings = Field(IdentifySettings(), description="Identification.")
     diagnose: DiagnoseSettings = Field(DiagnoseSettings(), description="Diagnosis.")
+    investigate: InvestigateSettings = Field(
+        InvestigateSettings(), description="Further experiments."
+    )
     simulate: SimulateSettings = Field(SimulateSettings(), description="Simulation.")
 
     # No field, as it is no key of the file, and no result is to list it.
@@ -124,16 +128,20 @@ class Experiment(Settings):
             )
 
     def run_named(self, name: str) -> RunSettings:
-        """Return one run's settings by its name.
+        """Return one run's settings by its name, or those of NAME+STEP.
 
         Raises
         ------
         SettingsError
             If there is no run of this name.
         """
+        # Runs of an investigation follow from those of exoid.toml, which has no [[run]] for them.
+        base, _, step = name.partition("+")
         for run in self.run:
             if run.name == name:
                 return run
+            if run.name == base and step.isdecimal():
+                return run.repeated(int(step))
         raise SettingsError(
             f"{self._path}: has no [[run]] named {name};"
             f" {suggestion(name, [run.name for run in self.run])}"

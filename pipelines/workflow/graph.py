@@ -15,6 +15,7 @@ from pipelines.settings.experiment import Experiment
 from pipelines.settings.rig import load_rig
 from pipelines.settings.rig.recording_only import is_recording_only
 from pipelines.workflow.imported import ImportedRuns
+from pipelines.workflow.investigation import motion_of
 
 STAGES = (
     "design",
@@ -150,7 +151,13 @@ class _Steps:
         """Yield the design, if a run needs one, and the runs that were not imported."""
         trajectory, recordings = self.out / "trajectory.parquet", self._recordings
         recorded = [
-            _recorded(self.experiment, run, recordings[run.name], trajectory, self._config_option)
+            _recorded(
+                self.experiment,
+                run,
+                recordings[run.name],
+                motion_of(self.out, run.step) if run.step else trajectory,
+                self._config_option,
+            )
             for run in self.experiment.run
             if run.name not in self.imported.names
         ]

@@ -16,12 +16,14 @@ from pipelines.settings.rig import load_rig
 from pipelines.settings.rig.recording_only import is_recording_only
 from pipelines.workflow.graph import Step, graph, sealed_file
 from pipelines.workflow.imported import with_imported
+from pipelines.workflow.investigation import with_investigation
 
 
 def split(experiment: Experiment, folder: Path) -> None:
     """Write ``<section>.json``, ``run-<name>.json`` and ``graph.mk`` into a folder."""
     experiment, imported = with_imported(experiment, folder.parent)
     imported.refuse_damaged()
+    experiment = with_investigation(experiment, imported, folder.parent)
     # Variables of make instead of paths, so that the rules hold in any folder.
     steps = graph(experiment, Path("$(CONFIG)"), Path("$(OUT)"), imported)
     sections = experiment.sections(

@@ -19,8 +19,10 @@ from pipelines.diagnosis.verdict.verdict import verdict
 from pipelines.effects import EFFECTS, Effect
 from pipelines.errors import NotIdentifiable
 from pipelines.investigation.planned import PlannedRuns
-from pipelines.investigation.rivals import Rival, sized
-from pipelines.investigation.separating_design import separating_design, separation_of_last
+from pipelines.investigation.rivals import Rival
+from pipelines.investigation.separating_design import separating_design
+from pipelines.investigation.separation_problem import SeparationProblem
+from pipelines.investigation.sized_rival import sized
 from pipelines.mechanics.geometry import Geometry
 from pipelines.mechanics.kinematics import motion_table
 from pipelines.mechanics.machine import THE_LEG
@@ -54,7 +56,7 @@ def undecided_pairs(usual: Trajectory) -> Iterator[tuple[Rival, Rival]]:
     """Yield pairs of causes that the usual excitation leaves undecided, but another may not."""
     for one, other in itertools.combinations(plain_effects(), 2):
         rivals = (Rival(one, 0.5), Rival(other, 0.5))
-        separated = separation_of_last(rivals, RUNS, usual)
+        separated = SeparationProblem.of(rivals, RUNS, usual).with_motion(usual)
         if min(separated.as_json()["decided"]) < UNDECIDED and not separated.inseparable():
             yield rivals
 
@@ -62,7 +64,8 @@ def undecided_pairs(usual: Trajectory) -> Iterator[tuple[Rival, Rival]]:
 def truth_of(rivals: tuple[Rival, Rival], number: int, usual: Trajectory) -> Term:
     """Return a rival as large as predictions take it, at the middle one of its shapes."""
     found = sized(rivals, RUNS.problem(usual, [one.effect for one in rivals]))[number]
-    candidate, amplitude = found.truths[len(found.truths) // 2]
+    middle = found.truths[len(found.truths) // 2]
+    candidate, amplitude = middle.candidate, middle.factor
     shape = np.array(candidate.shapes[0])
     linear = np.zeros(len(candidate.effect.linear))
     if len(linear):
@@ -100,7 +103,8 @@ def main(pairs: int, seed: int) -> None:
     for one, other in drawn[:pairs]:
         rivals = (one, other)
         try:
-            result = separating_design(separation_of_last(rivals, RUNS, usual), RUNS, Geometry())
+            problem = SeparationProblem.of(rivals, RUNS, usual)
+            result = separating_design(problem, Geometry(), usual)
         except NotIdentifiable as error:
             print(f"| {one.label} | {other.label} | {error} |", flush=True)
             continue

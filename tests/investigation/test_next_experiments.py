@@ -9,8 +9,8 @@ from pipelines.design.excitation import design
 from pipelines.investigation.next_experiments import next_experiments
 from pipelines.investigation.planned import PlannedRuns
 from pipelines.investigation.rivals import Rival, rivals_named
-from pipelines.investigation.separating_design import separation_of_last
 from pipelines.investigation.separation import decided
+from pipelines.investigation.separation_problem import SeparationProblem
 from pipelines.mechanics.geometry import Geometry
 from pipelines.mechanics.machine import THE_LEG
 from pipelines.settings.design import DesignSettings
@@ -30,7 +30,7 @@ def compared(usual, probabilities, *labels, kinds=("exo_alone", "with_human")):
         for one, p in zip(rivals_named(labels, THE_LEG), probabilities, strict=True)
     ]
     runs = PlannedRuns(QUICK, PlantSettings(), kinds)
-    return next_experiments(rivals, runs, Geometry(), usual)
+    return next_experiments(SeparationProblem.of(rivals, runs, usual), Geometry(), usual)
 
 
 def decides(result, what):
@@ -52,7 +52,8 @@ def test_a_decision_for_the_wrong_cause_does_not_count(usual):
     # On the usual motion a passive torque of one amplitude looks like a spring of two.
     labels = ("passive_joint_torque@hip", "parallel_spring@hip")
     rivals = [replace(one, probability=0.5) for one in rivals_named(labels, THE_LEG)]
-    again = separation_of_last(rivals, PlannedRuns(QUICK, PlantSettings(), ("with_human",)), usual)
+    runs = PlannedRuns(QUICK, PlantSettings(), ("with_human",))
+    again = SeparationProblem.of(rivals, runs, usual).with_motion(usual)
     odds = again.log_odds()
     assert odds[0, 1] > 10.0 and odds[1, 0] < 0.0
     posterior = again.posterior()

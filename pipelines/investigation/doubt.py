@@ -1,0 +1,87 @@
+"""What a verdict leaves open: a choice between causes, or between causes and none."""
+
+from dataclasses import dataclass, field
+from enum import Enum
+
+from pipelines.contracts.verdict import Finding, Posterior, Verdict
+
+NOTHING = "nothing"
+"""Label of the rival that nothing is missing."""
+DECIDED = 0.95
+"""Posterior probability of one rival from which the others are excluded."""
+CLOSE = 1.0 - DECIDED
+"""Probability from which a rival keeps the others from being decided."""
+
+
+class State(Enum):
+    """What a verdict says of what is missing."""
+
+    AT_FAULT = "at_fault"
+    """Acquisition is at fault, so that nothing is said of physics."""
+    NOTHING = "nothing"
+    NAMED = "named"
+    """Each finding is one cause that has ``DECIDED``."""
+    OPEN = "open"
+    """There is a choice, which an experiment may decide."""
+    UNLISTED = "unlisted"
+    """Something is missing, and it is no choice between listed causes."""
+
+
+@dataclass(frozen=True)
+class Doubt:
+    """The doubt that a verdict leaves."""
+
+    state: State
+    words: str
+    probabilities: dict[str, float] = field(default_factory=dict)
+    """Of the rivals by their labels, if the state is open; in all at most one."""
+
+
+def doubt_of(verdict: Verdict) -> Doubt:
+    """Return what a verdict leaves open."""
+    if verdict.acquisition_at_fault or verdict.posterior is None:
+        return Doubt(State.AT_FAULT, "acquisition is at fault; correct it and record again")
+    posterior = verdict.posterior
+    if not verdict.findings:
+        close = {label: p for label, p in posterior.causes.items() if p >= CLOSE}
+        if close:
+            return _open({NOTHING: posterior.nothing_missing, **close})
+        return Doubt(
+            State.NOTHING,
+            "nothing is missing that the recordings could show (probability"
+            f" {posterior.nothing_missing:.2f})",
+        )
+    unsettled = [one for one in verdict.findings if not _is_settled(one)]
+    for finding in unsettled:
+        rivals = _rivals(finding, posterior)
+        if len(rivals) > 1:
+            return _open(rivals)
+    if unsettled:
+        return Doubt(State.UNLISTED, f"{unsettled[0].words}: no choice between listed causes")
+    named = ", ".join(f"{f.words} ({f.probability:.2f})" for f in verdict.findings)
+    return Doubt(State.NAMED, f"decided: {named}")
+
+
+def _open(rivals: dict[str, float]) -> Doubt:
+    words = " or ".join(f"{label} ({p:.2f})" for label, p in rivals.items())
+    return Doubt(State.OPEN, f"open: {words}", rivals)
+
+
+def _is_settled(finding: Finding) -> bool:
+    """Return whether one cause of a finding has ``DECIDED``."""
+    alone = max((one.probability for one in finding.causes if not one.dropped), default=0.0)
+    return finding.level == "cause" and alone >= DECIDED
+
+
+def _rivals(finding: Finding, posterior: Posterior) -> dict[str, float]:
+    """Return the rivals of a finding; fewer than two where there is no choice."""
+    rivals = {
+        one.label: one.probability
+        for one in finding.causes
+        if not one.dropped and one.probability >= CLOSE
+    }
+    # The rest is that this finding is none, or an unlisted law, of which nothing can be planned.
+    rest = 1.0 - finding.probability - posterior.unlisted
+    if finding.level == "cause" and rest >= CLOSE:
+        rivals[NOTHING] = rest
+    return rivals

@@ -1,0 +1,203 @@
+"""Rivals with the sizes that agree with what is known, and how they look in some runs.
+
+Runs that did not separate causes showed one torque: each cause has the amplitudes with which it
+comes closest to it.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipelines.diagnosis.candidates.candidate import Candidate
+from pipelines.diagnosis.candidates.columns import torque_columns
+from pipelines.diagnosis.criteria import CRITERIA
+from pipelines.diagnosis.detectability.detection_problem import DetectionProblem
+from pipelines.diagnosis.detectability.directions import bend, direction_of, orthonormal
+from pipelines.diagnosis.detectability.shapes import shapes_of
+from pipelines.diagnosis.selection.prior import FEATURES, weights
+from pipelines.errors import InputError
+from pipelines.investigation.rivals import SETTING, Rival, effects_of
+from pipelines.model import Term
+
+
+@dataclass(frozen=True)
+class Truth:
+    """A cause of one shape and size."""
+
+    candidate: Candidate
+    factor: float
+    """Of the torque at ``linear``; 1 at the size of a shape that transforms the motion."""
+    linear: NDArray | None = None
+    """(k,) amplitudes; None for a first amplitude of 1, with others that suit it."""
+
+    def torque(self, problem: DetectionProblem, first: int = 0) -> NDArray:
+        """Return its torque in the rows of a problem, (rows,), from its run ``first`` on.
+
+        Without what the baseline explains, in units of the noise.
+        """
+        candidate = in_runs_of(self.candidate, problem)
+        if self.linear is None:
+            parts = _direction(candidate, problem)
+        else:
+            parts = [c @ self.linear[:, np.newaxis] for c in _parts(candidate, problem)]
+        parts = [(r >= first) * part for r, part in enumerate(parts)]
+        return self.factor * problem.remainder(parts)[:, 0]
+
+
+@dataclass(frozen=True)
+class SizedRival:
+    """A rival with the shapes and sizes that it may have; nothing has none."""
+
+    rival: Rival
+    truths: tuple[Truth, ...]
+    """Equally probable if it is the true cause."""
+    shapes: tuple[Candidate, ...]
+    """All shapes with which it could explain another cause."""
+
+
+@dataclass(frozen=True)
+class Appearance:
+    """What a cause of one shape can explain in the rows of a detection problem."""
+
+    span: NDArray
+    """(rows, k) orthonormal: all that its amplitudes can explain."""
+    log_size: float = 0.0
+    """Half the log determinant of the Gram matrix of its columns: how well amplitudes are known."""
+
+    @classmethod
+    def of(cls, candidate: Candidate, problem: DetectionProblem) -> "Appearance":
+        """Compute it for a shape in planned or recorded runs."""
+        candidate = in_runs_of(candidate, problem)
+        own = candidate.columns_in([run.motion.run for run in problem.runs])
+        parts = _parts(candidate, problem)
+        if not candidate.transforms_motion:
+            parts = [own.expand(c, r) for r, c in enumerate(parts)]
+        columns = problem.remainder(parts)
+        span = orthonormal(columns)
+        sizes = np.linalg.svd(span.T @ columns, compute_uv=False)[: span.shape[1]]
+        return cls(span, float(np.log(sizes).sum()))
+
+
+def in_runs_of(candidate: Candidate, problem: DetectionProblem) -> Candidate:
+    """Return a candidate for the runs of a problem; planned runs have equal shapes."""
+    return Candidate(candidate.effect, (candidate.shapes[0],) * len(problem.runs))
+
+
+def _direction(candidate: Candidate, problem: DetectionProblem) -> list[NDArray]:
+    """Return the torque at a first amplitude of 1, (m, O, 1) of each run."""
+    if candidate.transforms_motion:
+        return bend(candidate, problem)
+    return direction_of(candidate.effect, _parts(candidate, problem), problem)
+
+
+def _parts(candidate: Candidate, problem: DetectionProblem) -> list[NDArray]:
+    """Return the torque of each amplitude, (m, O, k) of each run."""
+    if candidate.transforms_motion:
+        return bend(candidate, problem)
+    return [torque_columns(candidate, r, run) for r, run in enumerate(problem.runs)]
+
+
+def sized(rivals: Sequence[Rival], problem: DetectionProblem) -> list[SizedRival]:
+    """Return rivals with the shapes and sizes that agree with what is known.
+
+    Where nothing is a rival, the torque that runs showed is at most as large as its probability
+    allows. Where a diagnosis fitted no rival, a cause makes a usual share of the joint's torque.
+
+    Parameters
+    ----------
+    rivals : sequence of Rival
+    problem : DetectionProblem
+        Runs with the last excitation, or a usual one.
+
+    Raises
+    ------
+    InputError
+        Where such runs cannot show a rival.
+    """
+    motions = [run.motion for run in problem.runs]
+    for effect in effects_of(rivals):
+        if not effect.shows_in(motions):
+            raise InputError(
+                f"{effect.label} cannot show in planned runs, which have no temperatures; give"
+                f" `exoid design {SETTING}` the other causes"
+            )
+    fitted = {rival.label: _fitted(rival.term, problem) for rival in rivals if rival.term}
+    nothing = sum(rival.probability for rival in rivals if rival.effect is None)
+    length = _seen_length(nothing, problem) if nothing > 0.0 else None
+    seen = None
+    if fitted:
+        seen = next(iter(fitted.values())).torque(problem)
+        factor = min(1.0, length / float(np.linalg.norm(seen))) if length else 1.0
+        seen = factor * seen
+        fitted = {label: replace(one, factor=factor) for label, one in fitted.items()}
+    return [_sized(rival, fitted.get(rival.label), seen, length, problem) for rival in rivals]
+
+
+def _fitted(term: Term, problem: DetectionProblem) -> Truth:
+    candidate = Candidate(term.effect, (tuple(term.shape.tolist()),) * len(problem.runs))
+    return Truth(candidate, 1.0, None if candidate.transforms_motion else term.linear)
+
+
+def _seen_length(nothing: float, problem: DetectionProblem) -> float:
+    """Return the length of a torque after which nothing is still so probable.
+
+    A cause of one amplitude gains half its square, and costs its prior odds and its amplitude.
+    """
+    price = 0.5 * np.log(problem.independent) - weights(CRITERIA)[FEATURES.index("cause")]
+    gain = max(np.log((1.0 - nothing) / nothing) + price, 0.0)
+    return float(np.sqrt(2.0 * gain))
+
+
+def _sized(
+    rival: Rival,
+    fitted: Truth | None,
+    seen: NDArray | None,
+    length: float | None,
+    problem: DetectionProblem,
+) -> SizedRival:
+    if rival.effect is None:
+        return SizedRival(rival, (), ())
+    grid = list(shapes_of(rival.effect, problem.runs))
+    if fitted is not None:
+        return SizedRival(rival, (fitted,), (fitted.candidate, *grid))
+    if seen is not None:
+        truths = _as_seen(grid, seen, problem)
+    else:
+        # A shape that these runs do not show has no size.
+        sizes = ((one, _factor(one, length, problem)) for one in grid)
+        truths = [Truth(one, factor) for one, factor in sizes if np.isfinite(factor)]
+    if not truths:
+        raise InputError(
+            f"{rival.label} makes no torque with the last excitation; give `exoid design"
+            f" {SETTING}` the other causes, or that run a wider motion"
+        )
+    return SizedRival(rival, tuple(truths), tuple(grid))
+
+
+def _as_seen(grid: Sequence[Candidate], seen: NDArray, problem: DetectionProblem) -> list[Truth]:
+    """Return the shapes that explain a torque (rows,) about as well as the best one does."""
+    # Log likelihood by which a shape may be worse: the others have an eighth of its probability.
+    tolerance = 2.0
+    truths, explained = [], []
+    for candidate in grid:
+        columns = problem.remainder(_parts(candidate, problem))
+        linear = np.linalg.lstsq(columns, seen, rcond=1e-9)[0]
+        gain = 0.5 * float(seen @ columns @ linear)
+        if gain > 0.0:
+            truths.append(Truth(candidate, 1.0, linear))
+            explained.append(gain)
+    best = max(explained, default=0.0)
+    return [one for one, gain in zip(truths, explained, strict=True) if gain >= best - tolerance]
+
+
+def _factor(candidate: Candidate, length: float | None, problem: DetectionProblem) -> float:
+    """Return the factor at which a candidate's torque is so long, or has a usual size."""
+    direction = _direction(candidate, problem)
+    if length is not None:
+        unit = float(np.linalg.norm(problem.remainder(direction)))
+        return length / unit if unit > 0.0 else np.inf
+    effect, share = candidate.effect, float(np.mean(CRITERIA.amplitudes))
+    rms = problem.rms(effect, direction)
+    return share * float(problem.torque_rms[problem.joint(effect)]) / rms if rms > 0.0 else np.inf
