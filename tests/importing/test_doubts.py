@@ -10,7 +10,8 @@ from numpy.testing import assert_allclose
 from exoid_cli.app import run
 from pipelines.importing.guess.torque import fit_torque
 from pipelines.importing.naming.meaning import meaning
-from pipelines.importing.quantities.wraparound import fill_value, full_at, sign_bit
+from pipelines.importing.quantities.wraparound import full_at, sign_bit
+from pipelines.signals.filler import fill_value
 from tests.importing.test_guess import guessed
 
 __all__ = ["guessed"]
