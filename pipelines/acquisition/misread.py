@@ -11,11 +11,13 @@ from pipelines.acquisition.encodings import (
     is_gray,
     is_half_of_float64,
     is_low_byte,
+    parts_in_low_word,
     written_keys,
 )
 from pipelines.acquisition.leaps import sign_leap
 from pipelines.settings.rig import Register
 from pipelines.signals.cut_off import cut_off_at
+from pipelines.signals.filler import fill_value
 from pipelines.signals.folded import is_folded, is_folded_angle
 from pipelines.signals.held import are_held, new_values
 from pipelines.signals.leaping import leaps
@@ -47,7 +49,13 @@ def misread(quantity: str, register: Register, where: str, values: NDArray) -> I
     if of_bits is not None:
         yield of_bits
         return
-    if not register.turn and (rows := _at_an_end(register, values)):
+    if not register.turn and (code := _code(register, new)) is not None:
+        yield (
+            f"a value is often exactly {code * register.si[0] + register.si[1]:.6g} (a raw"
+            f" {code:g}), far from all others: a code for missing readings? See the manual; let"
+            " the device repeat its last reading, or answer with an exception"
+        )
+    elif not register.turn and (rows := _at_an_end(register, values)):
         yield (
             f"{rows} of {len(values)} values are at the end of their register, where larger ones"
             " are cut off; let the device write coarser units, or two registers"
@@ -91,8 +99,27 @@ def misread(quantity: str, register: Register, where: str, values: NDArray) -> I
         )
 
 
+def _code(register: Register, new: NDArray) -> float | None:
+    """Return the raw value that stands for missing readings among new values (n,), if one does."""
+    # Fewest different values: a device at rest has a few, and a step of noise lies far from them.
+    enough = 16
+    value = fill_value(new)
+    # A raw 0 is no code: it is that of a drive that is off.
+    if value is None or register.counts is None or len(np.unique(new)) <= enough:
+        return None
+    raw = round((value - register.si[1]) / register.si[0])
+    return raw or None
+
+
 def _wrong_type(register: Register, where: str, new: NDArray) -> str | None:
     """Return of which encoding or type new values (n,) are, if it is not that of the register."""
+    parts = parts_in_low_word(register, new)
+    if parts is not None:
+        return (
+            f"its second word is never above {parts - 1}, so it counts parts of what the first one"
+            " counts, and no key reads both as one number; let the device write one number, or read"
+            f" the first word alone, with another {where}.type and scale"
+        )
     keys = decimal_keys(register, new)
     if keys:
         written = " and ".join(written_keys(keys))

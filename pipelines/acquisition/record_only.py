@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
+from numpy.typing import NDArray
 
 from pipelines.acquisition.machine.read_only import ReadOnlyMachine, ReadOnlyRow
 from pipelines.acquisition.machine.torn_words import TornRows
@@ -21,6 +22,7 @@ from pipelines.acquisition.machine.turns import LastingLeap
 from pipelines.acquisition.misread import held, leaping, misread
 from pipelines.acquisition.modbus.exclusive_access import exclusive_access
 from pipelines.acquisition.modbus.file_lock import locked
+from pipelines.acquisition.modbus.wraparound import CLOCK_TOLERANCE
 from pipelines.acquisition.pacing import LEAN
 from pipelines.acquisition.recording.journal import Journal
 from pipelines.acquisition.recording.journal_file import refuse_leftover
@@ -113,9 +115,27 @@ def misread_values(path: Path, rig_path: Path) -> list[str]:
             for text in (*texts, *held(time_s, values), *moves):
                 channels.setdefault(text, []).append(column)
     warnings = [f"{path}: {', '.join(columns)}: {text}" for text, columns in channels.items()]
+    warnings += [f"{path}: time_s: {text}" for text in _other_rate(table.metadata, rig, time_s)]
     if table.metadata["run"] == "exo_alone":  # a person may move the drives
         warnings += [f"{path}: {text}" for text in _absorbed(frame, rig)]
     return warnings
+
+
+def _other_rate(metadata: Mapping[str, Any], rig: RecordingRig, time_s: NDArray) -> Iterator[str]:
+    """Yield that the device's clock is faster or slower than any clock: its unit or scale is."""
+    reading = metadata.get("reading", {})
+    rate = reading.get("clock_rate", 1.0)
+    # Each end is uncertain by a sample and by the time of a request.
+    end_s = 1.0 / metadata["sample_rate_hz"] + reading.get("uncertainty_longest_s", 0.0)
+    seconds = float(time_s[-1] - time_s[0]) / rate
+    where = rig.drive[0].map
+    register = rig.map.drive[where].read.time
+    if register is not None and abs(rate - 1.0) * seconds > CLOCK_TOLERANCE * seconds + 2.0 * end_s:
+        yield (
+            f"the device's clock goes on by {rate:.4g} s in each second of this computer's;"
+            f" compare map.drive.{where}.read.time with the manual: scale ="
+            f" {register.scale / rate:.3g} would agree"
+        )
 
 
 def _absorbed(frame: pd.DataFrame, rig: RecordingRig) -> Iterator[str]:
@@ -195,6 +215,7 @@ class _Recorder:
         self._watchdog_s = rig.safety.watchdog_s
         self._stopped_by, self._report = stopped_by, report
         self._torn_rows = 0
+        self._clock = _ClockRate()
         self._widths: list[float] = []
         """Time from the first request of a row to its last answer, s."""
         self.why: str | None = None
@@ -241,6 +262,7 @@ class _Recorder:
                 fault = error
             else:
                 at, seconds = pace.place(row)
+                self._clock.take(row)
                 if at > number:
                     number, answered_at, fault = at, time.monotonic(), None
                     if number < self._planned:
@@ -288,7 +310,7 @@ class _Recorder:
             "uncertainty_median_s": median,
             "uncertainty_p99_s": p99,
             "uncertainty_longest_s": longest,
-        }
+        } | self._clock.metadata
 
 
 def _refuse_leap(
@@ -303,6 +325,27 @@ def _refuse_leap(
                 " on from there: its register starts again after a turn; set read.angle.wraps_at"
                 " in the rig file, in counts, and turns = true in [mechanism]"
             )
+
+
+class _ClockRate:
+    """How fast the first device's clock goes, from the first row to the last."""
+
+    def __init__(self) -> None:
+        self._rows: list[tuple[float, float]] = []
+        """Device's and host's time of the first and the last row, s."""
+
+    def take(self, row: ReadOnlyRow) -> None:
+        """Note a row's times."""
+        if row.time is not None:
+            self._rows = [*self._rows[:1], (row.time, 0.5 * (row.asked + row.answered))]
+
+    @property
+    def metadata(self) -> dict[str, float]:
+        """The device's seconds in one of the host's; empty without a clock."""
+        if len(self._rows) < 2:
+            return {}
+        (device, host), (device_end, host_end) = self._rows
+        return {"clock_rate": (device_end - device) / (host_end - host)}
 
 
 class _HostPace:

@@ -296,6 +296,45 @@ def test_a_torque_that_is_cut_off_within_its_register_is_named(record_and_check,
     assert all("at full slope and stay there" in text for text in (*texts, *findings))
 
 
+@pytest.mark.parametrize("code", [None, -9999, 0])
+def test_a_code_for_missing_readings_is_named(record_and_check, code):
+    """A raw 0 is that of a drive that is off."""
+
+    def answer(n, words):
+        swing = 500 + 100 * np.sin(0.06 * words[0])
+        torque = code if code is not None and words[0] % 50 == 0 else round(swing)
+        return [words[0], round(700.0 * np.sin(0.06 * words[0])) & 0xFFFF, torque & 0xFFFF]
+
+    _, texts, findings = record_and_check(answer, seconds=4.0, kind="with_human")
+    for said in (texts, findings):
+        assert ["often exactly -999.9 (a raw -9999)" in text for text in said] == [True] * (
+            code == -9999
+        )
+
+
+@pytest.mark.parametrize("ticks_hz", [1000.0, 1024.0])
+def test_a_clock_that_is_hardly_too_fast_is_named(record_and_check, ticks_hz):
+    """Ticks of 1/1024 s pass for milliseconds, and rates may differ by 5 % from row to row."""
+
+    def answer(n, words):
+        ticks = round(words[0] * ticks_hz / 100.0)
+        angle = round(700.0 * np.sin(0.06 * words[0])) & 0xFFFF
+        return [words[0], angle, 20, ticks >> 16, ticks & 0xFFFF]
+
+    was = "angle = {"
+    clock = 'time = { address = 3, type = "uint32", unit = "ms" }\n'
+    output, texts, findings = record_and_check(answer, was, clock + was, seconds=10.0)
+    rate = RECORDING.read(output).metadata["reading"]["clock_rate"]
+    assert rate == pytest.approx(ticks_hz / 1000.0, abs=2e-3)
+    is_named = ticks_hz != 1000.0
+    assert ["read.time with the manual: scale = 0.97" in text for text in texts] == [
+        True
+    ] * is_named
+    assert ["read.time with the manual: scale = 0.97" in text for text in findings] == [
+        True
+    ] * is_named
+
+
 @pytest.mark.parametrize("run", ["exo_alone", "with_human"])
 @pytest.mark.parametrize("scale", [0.1, -0.1])
 def test_a_torque_of_the_wrong_sign_is_named_where_nobody_is_in_the_machine(tmp_path, run, scale):

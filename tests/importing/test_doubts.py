@@ -10,7 +10,8 @@ from numpy.testing import assert_allclose
 from exoid_cli.app import run
 from pipelines.importing.guess.torque import fit_torque
 from pipelines.importing.naming.meaning import meaning
-from pipelines.importing.quantities.wraparound import fill_value, full_at, sign_bit
+from pipelines.importing.quantities.wraparound import full_at, sign_bit
+from pipelines.signals.filler import fill_value
 from tests.importing.test_guess import guessed
 
 __all__ = ["guessed"]
@@ -78,6 +79,34 @@ def test_a_moment_of_another_joint_than_the_angle_is_unsure(guessed, pendulum, w
     columns = {"time": pendulum.time, "knee_angle": pendulum.angle, "hip_moment": pendulum.torque}
     _, doubts = guessed(write_csv(columns))
     assert doubts["joint[0].torque.column"].startswith("its name says hip, the angle's knee")
+
+
+@pytest.mark.parametrize(
+    ("angle", "torque", "doubtful"),
+    [
+        ("output angle [deg]", "motor torque [Nm]", {"torque"}),
+        ("knee angle [deg]", "knee motor torque [Nm]", {"torque"}),
+        ("motor angle [deg]", "output torque [Nm]", {"angle"}),
+        ("motor angle [deg]", "motor torque [Nm]", set()),
+        ("angle [deg]", "torque [Nm]", set()),
+    ],
+)
+def test_a_gear_may_lie_between_a_motor_and_what_is_not_named_so(
+    guessed, pendulum, write_csv, angle, torque, doubtful
+):
+    columns = {angle: np.degrees(pendulum.angle), torque: pendulum.torque}
+    text, doubts = guessed(write_csv({"time": pendulum.time} | columns))
+    joint = tomllib.loads(text)["joint"][0]
+    for quantity in ("angle", "torque"):
+        is_doubtful = f"joint[0].{quantity}.gear_ratio" in doubts
+        assert is_doubtful == ("gear_ratio" in joint[quantity]) == (quantity in doubtful)
+
+
+def test_a_turn_of_an_electrical_angle_is_in_doubt(guessed, pendulum, write_csv):
+    columns = {"electrical angle [deg]": np.degrees(4.0 * pendulum.angle) % 360.0}
+    columns = {"time": pendulum.time} | columns | {"torque [Nm]": pendulum.torque}
+    _, doubts = guessed(write_csv(columns))
+    assert "for each pair of poles: set scale = 1 / pairs" in doubts["joint[0].angle.unit"]
 
 
 def test_one_of_several_columns_that_names_do_not_tell_apart_is_unsure(

@@ -52,6 +52,25 @@ def test_excel_with_titles_units_and_a_text_in_a_column(imported, pendulum, tmp_
     assert_allclose(frame["pivot_torque_nm"], np.delete(pendulum.torque[:300], 99), atol=1e-12)
 
 
+@pytest.mark.parametrize(("number_format", "stored"), [("0.0%", 0.01), ('0.0"%"', 1.0)])
+def test_a_share_of_a_workbook_is_read_in_the_per_cent_that_it_is_shown_in(
+    imported, pendulum, tmp_path, number_format, stored
+):
+    openpyxl = pytest.importorskip("openpyxl")
+    book = openpyxl.Workbook()
+    book.active.append(["time", "angle", "velocity", "torque [%]"])
+    for *others, torque in list(zip(*pendulum.columns().values(), strict=True))[:300]:
+        # 20 N·m are 100 %.
+        book.active.append([*map(float, others), stored * 5.0 * float(torque)])
+        book.active.cell(book.active.max_row, 4).number_format = number_format
+    book.save(tmp_path / "log.xlsx")
+    share = 'torque = { column = "torque [%]", unit = "%", rated_torque_nm = 20.0 }'
+    text = MAP.replace('torque = { column = "torque", unit = "N·m" }', share)
+    assert share in text
+    frame = imported(tmp_path / "log.xlsx", map_text=text).recording().frame
+    assert_allclose(frame["pivot_torque_nm"], pendulum.torque[:300], atol=1e-12)
+
+
 @pytest.mark.parametrize("name", ["log.xlsx", "log.npz"])
 def test_a_workbook_or_archive_that_was_cut_is_said_to_be_damaged(
     imported, pendulum, tmp_path, name

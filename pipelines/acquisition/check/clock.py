@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from pipelines.acquisition.check.finding import Finding
 from pipelines.acquisition.check.interpretation import remedy
 from pipelines.acquisition.check.probe import Probe, Series
-from pipelines.acquisition.modbus.wraparound import RATE_TOLERANCE
+from pipelines.acquisition.modbus.wraparound import CLOCK_TOLERANCE, RATE_TOLERANCE
 from pipelines.settings.rig.register import DIMENSION, UNITS
 
 
@@ -123,30 +123,40 @@ def _counts(counter: NDArray, seconds: float, rate_hz: float | None) -> bool:
 
 def _check_time(probe: Probe, series: Series, clock: Clock, seconds: float) -> Iterator[Finding]:
     time, where = series.of("time", counts=True), f"{probe.map_path}.read.time"
-    if _keeps_time(time, seconds):
+    # Of the first and the last answer, it is not known when in a request they were read.
+    late_s = float(np.max((series.answered - series.asked)[[0, -1]]))
+    if _keeps_time(time, seconds, late_s):
         return
     register, rate = series.block.registers["time"], clock.clock_rate or 0.0
     reference = "by its counter" if probe.in_lockstep else "of this computer's clock"
     measured = f"its clock goes on by {rate:.4g} s in each second {reference}"
     for unit in DIMENSION["time"]:
-        if rate and abs(rate * UNITS[unit] / UNITS[register.unit] - 1.0) <= RATE_TOLERANCE:
+        is_other = unit != register.unit
+        if (
+            is_other
+            and rate
+            and abs(rate * UNITS[unit] / UNITS[register.unit] - 1.0) <= RATE_TOLERANCE
+        ):
             yield probe.finding(
                 f'{measured}; with unit = "{unit}" the two agree: correct {where}', "time"
             )
             return
-    mended = remedy("time", " s", where, series, lambda v: _keeps_time(v, seconds), counts=True)
+    mended = remedy(
+        "time", " s", where, series, lambda v: _keeps_time(v, seconds, late_s), counts=True
+    )
     scale = f"{register.scale / rate:.3g} would agree" if rate > 0 else "no scale would agree"
     otherwise = f"compare {where} with the manual: scale = {scale}"
     yield probe.finding(f"{measured}; {mended or otherwise}", "time")
 
 
-def _keeps_time(time: NDArray, seconds: float) -> bool:
+def _keeps_time(time: NDArray, seconds: float, late_s: float = 0.0) -> bool:
     if not np.isfinite(time).all() or (np.diff(time) < 0).any():
         return False
     steps = np.diff(time)
     # A sample more or less at either end; the median, as a single leap must not allow itself.
     sample = float(np.median(steps[steps > 0])) if steps.any() else 0.0
-    return bool(abs(time[-1] - time[0] - seconds) <= RATE_TOLERANCE * seconds + 2.0 * sample)
+    error_s = CLOCK_TOLERANCE * seconds + 2.0 * sample + late_s
+    return bool(abs(time[-1] - time[0] - seconds) <= error_s)
 
 
 def check_latch(probe: Probe, series: Series) -> Iterator[Finding]:

@@ -2,6 +2,8 @@
 
 RATE_TOLERANCE = 0.05
 """Largest relative difference between a device's rate and the expected one."""
+CLOCK_TOLERANCE = 0.01
+"""Largest error of a device's clock as a whole: a quartz is within 0.01 %, an RC oscillator 1 %."""
 
 
 def unwrap(value: float, near: float, modulus: float) -> float:

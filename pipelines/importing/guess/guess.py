@@ -35,11 +35,11 @@ from pipelines.importing.guess.time import (
 )
 from pipelines.importing.naming.meaning import Meaning, meaning
 from pipelines.importing.quantities.numbers import numbers, same_stamps, whole_nanoseconds
-from pipelines.importing.quantities.wraparound import fill_value
 from pipelines.importing.sources.source import Columns, Source
 from pipelines.importing.time import clock
 from pipelines.importing.time.period import repeats_after
 from pipelines.settings.units import unit_named
+from pipelines.signals.filler import fill_value
 from pipelines.signals.held import are_held
 
 TRAIN = 0.7

@@ -15,6 +15,7 @@ from pipelines.importing.guess.motion import FROM_NAME, TURNS, Units, guess_unit
 from pipelines.importing.guess.own_clocks import OwnClock
 from pipelines.importing.guess.proposal import Proposal
 from pipelines.importing.guess.torque import TorqueFit, fit_torque
+from pipelines.importing.naming.meaning import of_motor
 from pipelines.importing.quantities.numbers import are_whole
 from pipelines.importing.sanity.plausibility import STRONGEST
 from pipelines.importing.sources.source import Columns
@@ -158,7 +159,7 @@ class _JointWriter:
         if self.units.angle == "counts":
             counts = self.units.counts_in_turn
             self._write_counts(f"; by the velocity {counts:.4g} in its turn" if counts else "")
-        if self.may_be_motor:
+        if self.may_be_motor or self._is_of_motor("angle", self.joint.drive):
             self._write_gear("if the encoder sits on the motor")
         self._write_counting("angle")
         self._write_zero(fit)
@@ -302,6 +303,14 @@ class _JointWriter:
             why += f"; {ratio:g} by the velocity"
         self.proposal.key("gear_ratio", ratio, why, sure=False)
 
+    def _is_of_motor(self, quantity: str, other: str | None) -> bool:
+        """Return whether the name of one quantity says the motor, and that of another does not."""
+        return (
+            other is not None
+            and of_motor(self.joint.columns[quantity].column)
+            and not of_motor(self.joint.columns[other].column)
+        )
+
     def _write_zero(self, fit: TorqueFit | None) -> None:
         # Least reach of a joint from which gravity shows the direction down.
         swings_rad = 2.0
@@ -366,6 +375,8 @@ class _JointWriter:
             self.proposal.unknown("unit", f"{why}: is it another column?")
         else:
             self.proposal.key("unit", *self._unit_of_torque(named, self.logged[drive]))
+            if self._is_of_motor(drive, "angle"):
+                self._write_gear("if the torque is the motor's")
             if dimension == "torque" and self.slides:
                 why = "travel for a turn of the screw, from its data sheet"
                 self.proposal.unknown("lead_m", why)

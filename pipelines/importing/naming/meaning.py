@@ -77,6 +77,10 @@ NOISE = _words(
     " axe articulation de du la le en"
 )
 """Words that are no part of a joint's name."""
+MOTORS = _words("motor mot moteur rotor")
+"""Words of what turns before a gear."""
+POLES = _words("electrical elec elektrisch elektrischer electrique")
+"""Words of an angle or velocity that counts a turn for each pair of a motor's poles."""
 JOINTS = {"huefte": "hip", "hueft": "hip", "hanche": "hip", "knie": "knee", "genou": "knee"}
 """Translations of a leg's joints."""
 RUNS = _words(
@@ -106,7 +110,9 @@ DIMENSIONS = {
     "force": {"force", "share"},
 }
 """Dimensions of the units that each quantity may have."""
-KNOWN = frozenset().union(*WORDS.values(), COMMANDED, FILTERED, MEASURED, NOISE, SOMETHING_ELSE)
+KNOWN = frozenset().union(
+    *WORDS.values(), COMMANDED, FILTERED, MEASURED, NOISE, POLES, SOMETHING_ELSE
+)
 
 
 @dataclass(frozen=True)
@@ -125,7 +131,7 @@ class Meaning:
     unread: str = ""
     """Text of a unit in the name that no map has, such as ``0.1 Nm``."""
     doubt: str = ""
-    """Another meaning that the unit in the name may have."""
+    """Another meaning that the reading may have."""
 
     @property
     def rank(self) -> int:
@@ -179,8 +185,20 @@ def meaning(name: str) -> Meaning:
         filtered=bool(distinct & FILTERED),
         measured=bool(distinct & MEASURED),
         unread=in_name.unread if in_name else "",
-        doubt=in_name.doubt if in_name and unit else "",
+        doubt=_doubt(quantity, distinct, in_name.doubt if in_name and unit else ""),
     )
+
+
+def _doubt(quantity: str, words: set[str], of_unit: str) -> str:
+    """Return another meaning that a reading may have, by the words of its name or by its unit."""
+    if quantity in ("angle", "velocity", "reference") and words & POLES:
+        return "electrical, a turn for each pair of poles: set scale = 1 / pairs"
+    return of_unit
+
+
+def of_motor(name: str) -> bool:
+    """Return whether a name says that the motor's side of a gear was measured."""
+    return bool(MOTORS & set(words_of(name)))
 
 
 def _containers(name: str) -> set[str]:

@@ -11,12 +11,12 @@ from pipelines.contracts.joints import in_words
 from pipelines.errors import InputError
 from pipelines.importing.finding import Finding, counted
 from pipelines.importing.quantities.consistency import MOST, integral_agreement, whole_rows
-from pipelines.importing.quantities.wraparound import fill_value
 from pipelines.mechanics.geometry import Geometry
 from pipelines.mechanics.machine import known_in_words, machine_of, mechanisms_of
 from pipelines.mechanics.remedies import AT_REST
 from pipelines.settings.import_map import ImportMap, JointSettings
 from pipelines.signals.cut_off import cut_off_at
+from pipelines.signals.filler import fill_value
 from pipelines.signals.folded import is_folded, is_folded_angle
 from pipelines.signals.held import new_values
 from pipelines.signals.leaping import leaps

@@ -1,8 +1,11 @@
 """Logs in workbooks of Excel (.xlsx)."""
 
 import csv
+import re
 from collections.abc import Iterable
 from datetime import date, time
+from decimal import Decimal
+from functools import cache
 from io import StringIO
 from pathlib import Path
 from typing import Any
@@ -33,7 +36,7 @@ def open_excel(path: Path, settings: SourceSettings) -> Source:
                 f"{suggestion(settings.table, list(sheets))}"
             )
         texts = {
-            title: _text(sheet.iter_rows(values_only=True))
+            title: _text(sheet.iter_rows())
             for title, sheet in sheets.items()
             if settings.table in (None, title)
         }
@@ -66,6 +69,20 @@ def _text(rows: Iterable[tuple[Any, ...]]) -> str:
 
 def _cells(row: tuple[Any, ...]) -> list[str]:
     return [
-        cell.isoformat() if isinstance(cell, date | time) else " ".join(str(cell).split())
-        for cell in ("" if cell is None else cell for cell in row)
+        value.isoformat() if isinstance(value, date | time) else " ".join(str(value).split())
+        for value in ("" if cell.value is None else _shown(cell) for cell in row)
     ]
+
+
+def _shown(cell: Any) -> Any:
+    """Return the value of a cell; a share that is shown in per cent, 0.153 as 15.3 %, in these."""
+    is_number = isinstance(cell.value, int | float) and not isinstance(cell.value, bool)
+    if is_number and _is_percentage(cell.number_format):
+        return Decimal(repr(cell.value)).scaleb(2)
+    return cell.value
+
+
+@cache
+def _is_percentage(number_format: str) -> bool:
+    """Return whether Excel multiplies numbers by 100, as for a % that is no mere text."""
+    return "%" in re.sub(r'"[^"]*"|\\.|_.|\*.', "", number_format)

@@ -29,6 +29,13 @@ def test_a_leap_does_not_allow_itself(leap):
     assert not keeps_time(leapt, SECONDS[-1])
 
 
+@pytest.mark.parametrize("ticks_hz", [1000.0, 1024.0])
+def test_a_clock_in_another_tick_keeps_no_time(ticks_hz):
+    """Ticks of 1/1024 s pass for milliseconds."""
+    seconds = np.arange(0.0, 2.0, 0.005)
+    assert keeps_time(1e-3 * ticks_hz * seconds, seconds[-1]) == (ticks_hz == 1000.0)
+
+
 def test_a_clock_that_stands_still_or_goes_back_keeps_no_time():
     assert not keeps_time(np.zeros(200), 1.0)
     assert not keeps_time(SECONDS[::-1], 1.0)
