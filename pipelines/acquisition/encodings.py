@@ -49,29 +49,6 @@ def decimal_keys(register: Register, values: NDArray) -> dict[str, str | int]:
     return {key: value for key, value in best.items() if getattr(register, key) != value}
 
 
-def parts_in_low_word(register: Register, values: NDArray) -> int | None:
-    """Return how many parts of the high word's unit the low word counts, as 100; else None.
-
-    Degrees in one register and hundredths in the next have decimal digits alone, too. But while
-    the high word changes, the low one never comes near 9999, as a number of both would.
-
-    Parameters
-    ----------
-    register : Register
-        As in the rig file.
-    values : (n,) array
-        New values in a row, as it reads them, SI units.
-    """
-    # Values, and how many of each word differ, that are no coincidence.
-    enough, highs, lows = 30, 4, 8
-    if not _is_judged(register) or register.bits != 32 or len(values) < enough:
-        return None
-    high, low = np.divmod(np.array(_raw(register, values), dtype=np.int64), 2**16)
-    if len(np.unique(high)) < highs or len(np.unique(low)) < lows:
-        return None
-    return next((parts for parts in (10, 100, 1000) if low.max() < parts), None)
-
-
 def written_keys(keys: Mapping[str, str | float]) -> list[str]:
     """Return keys and their values as a rig file has them."""
     return [

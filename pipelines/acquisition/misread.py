@@ -11,7 +11,6 @@ from pipelines.acquisition.encodings import (
     is_gray,
     is_half_of_float64,
     is_low_byte,
-    parts_in_low_word,
     written_keys,
 )
 from pipelines.acquisition.leaps import sign_leap
@@ -113,13 +112,6 @@ def _code(register: Register, new: NDArray) -> float | None:
 
 def _wrong_type(register: Register, where: str, new: NDArray) -> str | None:
     """Return of which encoding or type new values (n,) are, if it is not that of the register."""
-    parts = parts_in_low_word(register, new)
-    if parts is not None:
-        return (
-            f"its second word is never above {parts - 1}, so it counts parts of what the first one"
-            " counts, and no key reads both as one number; let the device write one number, or read"
-            f" the first word alone, with another {where}.type and scale"
-        )
     keys = decimal_keys(register, new)
     if keys:
         written = " and ".join(written_keys(keys))

@@ -51,19 +51,6 @@ def test_digits_are_named_and_nothing_is_where_they_are_read_as_such(device, use
     assert decimal_keys(Register(address=0, **device), read(counts, device, device)) == {}
 
 
-@pytest.mark.parametrize("parts", [100, 1000, 10_000, 65536])
-def test_a_low_word_that_counts_parts_is_no_number_of_decimal_digits(parts):
-    """As of an inclinometer with degrees in a register, and hundredths in the next."""
-    whole, part = np.divmod(np.round(60 * parts * SWING).astype(int), parts)
-    register = Register(address=0, type="int32", scale=1 / 65536)
-    texts = list(misread("angle", register, "x", whole + part / 65536))
-    if parts <= 1000:
-        (text,) = texts
-        assert f"second word is never above {parts - 1}" in text and "mod10" not in text
-    else:
-        assert not any("second word" in text for text in texts)
-
-
 def test_the_magnitude_of_an_angle_is_named():
     """As of an inclinometer, whose tilt has no sign."""
     register = Register(address=0, type="int16", scale=0.01)
