@@ -49,6 +49,42 @@ def decimal_keys(register: Register, values: NDArray) -> dict[str, str | int]:
     return {key: value for key, value in best.items() if getattr(register, key) != value}
 
 
+def apart_word(register: Register, values: NDArray, keys: Mapping[str, str | int]) -> int | None:
+    """Return the largest low word of values whose two registers are not one number, else None.
+
+    The low word of one number takes all values while the high word changes. One that counts the
+    hundredths of a unit, or something else, stays near 0.
+
+    Parameters
+    ----------
+    register : Register
+        As in the rig file.
+    values : (n,) array
+        New values in a row, as it reads them, SI units.
+    keys : dict
+        Keys with which they make decimal numbers, if they do: `decimal_keys`.
+    """
+    decimal = register.model_copy(update=dict(keys))
+    if register.counts is None or register.registers != 2 or decimal.encoding == "bcd":
+        return None
+    scale, offset = register.si
+    counts: NDArray | None = np.round((values[np.isfinite(values)] - offset) / scale)
+    if keys:
+        counts = _decoded(decimal, _raw(register, values))
+    if counts is None or len(counts) < 2:
+        return None
+    high = np.round(counts / decimal.word)
+    largest = int(np.abs(counts - high * decimal.word).max())
+    # Values in coarse steps leave few low words, and no evidence if they leave one.
+    step = int(np.gcd(np.gcd.reduce(np.diff(counts).astype(np.int64)), decimal.word))
+    share = min(1.0, (2 * (largest // step) + 1) * step / decimal.word)
+    # Set-points leap from one round number to another. A motion passes each boundary between two
+    # high words, and each boundary counts once.
+    passed = np.abs(np.diff(high)) == 1.0
+    boundaries = len(np.unique((high[1:] + high[:-1])[passed]))
+    return largest if step < decimal.word and share**boundaries <= CHANCE else None
+
+
 def written_keys(keys: Mapping[str, str | float]) -> list[str]:
     """Return keys and their values as a rig file has them."""
     return [

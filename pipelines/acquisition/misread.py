@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipelines.acquisition.encodings import (
+    apart_word,
     decimal_keys,
     is_float16,
     is_gray,
@@ -113,6 +114,13 @@ def _code(register: Register, new: NDArray) -> float | None:
 def _wrong_type(register: Register, where: str, new: NDArray) -> str | None:
     """Return of which encoding or type new values (n,) are, if it is not that of the register."""
     keys = decimal_keys(register, new)
+    largest = apart_word(register, new, keys)
+    if largest is not None:
+        return (
+            f"the low word stays within {largest} counts of 0 while the high word changes, so the"
+            " two registers are not one number. They may be a unit and its hundredths, or two"
+            " quantities; let the device write one number, or read each word alone"
+        )
     if keys:
         written = " and ".join(written_keys(keys))
         return f"all digits are decimal, so the register is not binary; set {where}.{written}"

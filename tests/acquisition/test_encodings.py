@@ -5,6 +5,7 @@ import pytest
 
 from pipelines.acquisition.encodings import (
     CHANCE,
+    apart_word,
     decimal_keys,
     is_float16,
     is_gray,
@@ -58,6 +59,31 @@ def test_the_magnitude_of_an_angle_is_named():
     (text,) = misread("angle", register, "x", register.scale * np.abs(angle))
     assert "set x.sign_bit" in text
     assert not list(misread("angle", register, "x", register.scale * angle))
+
+
+@pytest.mark.parametrize("used", [LONG_SIGNED, LONG, LONG | MOD10, LONG_SIGNED | MOD10])
+@pytest.mark.parametrize("parts", [60, 100, 1000])
+def test_whole_degrees_and_their_parts_in_two_registers_are_no_number(used, parts):
+    """As of an encoder's display; neither a binary number of two words nor a decimal one is."""
+    degrees = 60 + 40 * SWING
+    words = 65536 * np.floor(degrees).astype(int) + (degrees % 1.0 * parts).astype(int)
+    register = Register(address=0, scale=0.25, **used)
+    values = 0.25 * read(words, LONG, used)
+    (text,) = misread("angle", register, "x", values)
+    assert "the two registers are not one number" in text
+    assert f"within {int((words % 65536).max())} counts" in text
+
+
+@pytest.mark.parametrize("kind", [LONG_SIGNED, LONG_SIGNED | MOD10, LONG | LONG_SIGN])
+@pytest.mark.parametrize("size", [3, 300, 3e4, 3e5, 3e6])
+@pytest.mark.parametrize("steps", [1, 100, 2500, 10000, 16384, 65536])
+def test_one_number_of_two_registers_is_not_taken_for_two(kind, size, steps):
+    """Of any size, in steps that leave few low words; and that rests at whole numbers."""
+    register = Register(address=0, **kind)
+    noise = np.random.default_rng(0).normal(size=300)
+    for counts in (size * SWING, size * np.sign(SWING) + noise, size * SWING + 1e5):
+        values = np.round(counts / steps) * steps
+        assert apart_word(register, values, decimal_keys(register, values)) is None
 
 
 @pytest.mark.parametrize("bits", [8, 12, 16])
