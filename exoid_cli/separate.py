@@ -26,7 +26,7 @@ class Question:
 
 
 def question_of(
-    labels: Sequence[str], verdict: Path | None, experiment: Any, settings: Any, config: Path | None
+    labels: Sequence[str], folder: Path | None, experiment: Any, settings: Any, config: Path | None
 ) -> Question:
     """Return the question between rivals that are named, or that a verdict leaves open.
 
@@ -35,6 +35,7 @@ def question_of(
     InputError
         Where they are no rivals, or one is part of the model, or the verdict is not of the leg.
     """
+    from pipelines.contracts.verdict import read
     from pipelines.diagnosis.detectability.planned_runs import usual_plant
     from pipelines.errors import InputError
     from pipelines.investigation.planned import PlannedRuns
@@ -46,12 +47,14 @@ def question_of(
 
     known = tuple(experiment.diagnose.known)
     runs = PlannedRuns(settings, usual_plant(experiment.mechanism), known=known)
-    if verdict is None:
+    if folder is None:
         rivals = rivals_named(labels, THE_LEG)
     else:
+        file = folder / "verdict.json"
+        verdict = read(file)
         # First whether it is of the leg: the labels of another machine would be refused for typos.
-        runs = runs.as_in_verdict(verdict)
-        rivals = rivals_in_verdict(verdict, THE_LEG)
+        runs = runs.as_in_verdict(verdict, file)
+        rivals = rivals_in_verdict(verdict, file, THE_LEG)
     for rival in rivals:
         if rival.label in known:
             raise InputError(
@@ -59,10 +62,10 @@ def question_of(
                 " share; remove it there, or separate other causes"
             )
     # The diagnosed recordings lie where the experiment's other results are.
-    results = verdict.resolve().parent if verdict else None
+    results = folder.resolve().parent if folder else None
     geometry = geometry_from(experiment) or Geometry()
     name, motions = excitations(config, settings, geometry, results)
-    if verdict is not None:
+    if folder is not None:
         runs = runs.after(motions)
     return Question(SeparationProblem.of(rivals, runs, motions[-1]), motions[-1], name)
 

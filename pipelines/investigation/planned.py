@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from pipelines.contracts.verdict import read
+from pipelines.contracts.verdict import Verdict
 from pipelines.diagnosis.detectability.detection_problem import DetectionProblem
 from pipelines.diagnosis.detectability.planned_runs import planned_motions, planned_noise
 from pipelines.diagnosis.evidence.baseline import baseline_of
@@ -37,22 +37,17 @@ class PlannedRuns:
     """Motions of the runs that a diagnosis had, to which these are added."""
     diagnosed_kinds: tuple[str, ...] = ()
 
-    def as_in_verdict(self, folder: Path) -> "PlannedRuns":
-        """Return runs of the kinds, and with the noise, of a diagnosis.
+    def as_in_verdict(self, verdict: Verdict, file: Path) -> "PlannedRuns":
+        """Return runs of the kinds, and with the noise, of a verdict in some file.
 
         Raises
         ------
-        ContractError
-            Where its verdict is damaged.
         InputError
             Where it is of another machine than the leg.
         """
-        verdict = read(folder / "verdict.json")
         noise = verdict.noise_floor_nm
         if set(noise) != {"hip", "knee"}:
-            raise InputError(
-                f"{folder}: its verdict is of the joints {', '.join(noise)}, expected hip and knee"
-            )
+            raise InputError(f"{file}: is of the joints {', '.join(noise)}, expected hip and knee")
         return replace(self, kinds=tuple(verdict.runs), noise_nm=(noise["hip"], noise["knee"]))
 
     def after(self, motions: Sequence[Trajectory]) -> "PlannedRuns":

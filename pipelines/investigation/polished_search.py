@@ -87,7 +87,7 @@ def polished_search(
     for i, (start, scale) in enumerate(starts):
         done = 0.5 * (1.0 + i / len(starts))
         # The start itself counts, which none of its neighbours may reach.
-        for found, value in (
+        for candidate, value in (
             (start, float(costs_of(start[np.newaxis])[0])),
             polish(
                 start,
@@ -100,7 +100,7 @@ def polished_search(
             ),
         ):
             if value < best_cost:
-                best, best_cost = found, value
+                best, best_cost = candidate, value
     stopped_by = "seconds" if time.monotonic() > deadline else "stagnation"
     trajectory = trajectory_of(best, problem)
     return Design(trajectory, quality(trajectory, settings, geometry), settings, stopped_by)

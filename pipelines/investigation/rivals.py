@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from pipelines.contracts.verdict import read
+from pipelines.contracts.verdict import Verdict
 from pipelines.effects import Effect
 from pipelines.errors import InputError, about
 from pipelines.investigation.doubt import NOTHING, doubt_of
@@ -61,16 +61,18 @@ def rivals_named(labels: Sequence[str], machine: Machine) -> list[Rival]:
     return [Rival(effect, 1.0 / len(effects)) for effect in effects]
 
 
-def rivals_in_verdict(folder: Path, machine: Machine) -> list[Rival]:
+def rivals_in_verdict(verdict: Verdict, file: Path, machine: Machine) -> list[Rival]:
     """Return the rivals between which a diagnosis did not decide, with its probabilities.
 
-    They are those of the most probable finding in which no cause has ``DECIDED``. A cause without
-    another one in its place, and causes where nothing is missing, have nothing as their rival.
+    They are those of the most probable finding in which no cause has ``DECIDED``. Where it may be
+    that nothing is missing, that is a rival, too.
 
     Parameters
     ----------
-    folder : Path
+    verdict : Verdict
         What ``exoid diagnose`` wrote.
+    file : Path
+        Its file, for messages.
     machine : Machine
         That was diagnosed.
 
@@ -79,13 +81,12 @@ def rivals_in_verdict(folder: Path, machine: Machine) -> list[Rival]:
     InputError
         Where it leaves no choice, in words.
     ContractError
-        Where the verdict is damaged.
+        Where a cause has values that it cannot have.
     """
-    verdict = read(folder / "verdict.json")
     doubt = doubt_of(verdict)
     if not doubt.probabilities:
         raise InputError(
-            f"{folder}: its verdict leaves no choice of causes, which a motion could decide"
+            f"{file}: leaves no choice of causes, which a motion could decide"
             f" ({doubt.words}); `exoid design {SETTING}` takes any causes"
         )
     total = sum(doubt.probabilities.values())
@@ -100,9 +101,9 @@ def rivals_in_verdict(folder: Path, machine: Machine) -> list[Rival]:
         if label == NOTHING:
             rivals.append(Rival(None, probability / total))
             continue
-        effect = cause_at(label, machine, str(folder))
+        effect = cause_at(label, machine, str(file))
         values = fitted.get(label)
-        with about(folder / "verdict.json"):
+        with about(file):
             term = term_from(effect, values) if values else None
         rivals.append(Rival(term.effect if term else effect, probability / total, term))
     return rivals

@@ -223,7 +223,7 @@ def test_a_verdict_s_ties_are_rivals_with_its_probabilities_and_noise(tmp_path):
     ]
     (folder / "verdict.json").write_text(json.dumps(document))
     found = read(folder / "verdict.json")
-    rivals = rivals_in_verdict(folder, THE_LEG)
+    rivals = rivals_in_verdict(found, folder / "verdict.json", THE_LEG)
     assert {one.label: one.probability for one in rivals} == pytest.approx(
         {"cogging@knee": 2.0 / 3.0, "parallel_spring@knee": 1.0 / 3.0}
     )
@@ -231,15 +231,16 @@ def test_a_verdict_s_ties_are_rivals_with_its_probabilities_and_noise(tmp_path):
     assert np.linalg.norm(rivals[0].term.linear) == pytest.approx(1.5)
     assert rivals[0].term.shape == pytest.approx([9.0])
     assert rivals[1].term is None
-    planned = RUNS.as_in_verdict(folder)
+    planned = RUNS.as_in_verdict(found, folder / "verdict.json")
     assert planned.noise_nm == (found.noise_floor_nm["hip"], found.noise_floor_nm["knee"])
     assert planned.kinds == tuple(found.runs)
 
 
 def test_a_verdict_without_a_choice_or_of_another_machine_is_refused(tmp_path):
     write_verdict(tmp_path, **decision_of(ties=()))
+    file = tmp_path / "diagnosed" / "verdict.json"
     with pytest.raises(InputError, match="leaves no choice of causes"):
-        rivals_in_verdict(tmp_path / "diagnosed", THE_LEG)
+        rivals_in_verdict(read(file), file, THE_LEG)
     write_verdict(tmp_path, AXIS, **decision_of(AXIS))
     with pytest.raises(InputError, match="expected hip and knee"):
-        RUNS.as_in_verdict(tmp_path / "diagnosed")
+        RUNS.as_in_verdict(read(file), file)
