@@ -135,7 +135,7 @@ def _show(folder: ExperimentFolder, doubt: "Doubt", why: str) -> None:
     document: dict[str, Any] = {"state": doubt.state.value, "words": doubt.words, "stopped_by": why}
     console.emit(document | {"steps": [one.as_json() for one in steps]})
     console.say("")
-    headings = ("step", "runs", "was to decide", *labels)
+    headings = ("step", "runs", "expected to decide", *labels)
     rows = [
         (
             str(one.step),

@@ -13,6 +13,7 @@ from pipelines.report.sections.control import comparison, loops_of
 from pipelines.report.sections.decision import decision
 from pipelines.report.sections.error_budget import budget, falls, with_causes
 from pipelines.report.sections.excitation import excitation
+from pipelines.report.sections.investigation import investigation
 from pipelines.report.sections.key_figures import tiles
 from pipelines.report.sections.parameters import models, side_by_side
 from pipelines.report.sections.recordings import recordings
@@ -63,6 +64,7 @@ def _context(session: Session, drawn: Charts) -> dict[str, Any]:
     context: dict[str, Any] = {
         **headline.context(session),
         "decision": decision(verdict) if verdict else None,
+        "investigation": investigation(session),
         "hero": drawn.hero,
         "runs": runs(session, drawn.measured),
         "mask": (verdict.scoring.get("mask") if verdict else None) or "slow motion",

@@ -1,0 +1,35 @@
+"""The card of an investigation: how probable each cause was after each step."""
+
+from typing import Any
+
+from pipelines.report.session import Session
+from pipelines.wording.investigation import history
+from pipelines.wording.label import label_in_words
+from pipelines.workflow.investigation import last_step
+
+
+def investigation(session: Session) -> dict[str, Any] | None:
+    """Return the values of the template's card; None where nothing was investigated."""
+    out = next((folder for folder in session.folders if last_step(folder)), None)
+    if out is None or session.verdict_file is None:
+        return None
+    steps = history(out, session.verdict_file.path)
+    labels = dict.fromkeys(label for one in steps for label in one.probabilities)
+    nothing = {"nothing": "nothing is missing"}
+    return {
+        "steps": [
+            {"step": one.step, "runs": one.runs, "decides": one.decides, "file": _motion(one.step)}
+            for one in steps
+        ],
+        "rows": [
+            {
+                "words": nothing.get(label) or label_in_words(label),
+                "probabilities": [one.probabilities.get(label, 0.0) for one in steps],
+            }
+            for label in labels
+        ],
+    }
+
+
+def _motion(step: int) -> str:
+    return f"investigation/{step}/trajectory.parquet" if step else "trajectory.parquet"
