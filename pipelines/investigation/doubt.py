@@ -57,7 +57,12 @@ def doubt_of(verdict: Verdict) -> Doubt:
         if len(rivals) > 1:
             return _open(rivals)
     if unsettled:
-        return Doubt(State.UNLISTED, f"{unsettled[0].words}: no choice between listed causes")
+        one = unsettled[0]
+        return Doubt(
+            State.UNLISTED,
+            f"open: {one.words} ({one.probability:.2f}), or an unlisted law, which no motion can be"
+            " planned for",
+        )
     named = ", ".join(f"{f.words} ({f.probability:.2f})" for f in verdict.findings)
     return Doubt(State.NAMED, f"decided: {named}")
 

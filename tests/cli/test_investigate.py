@@ -1,0 +1,130 @@
+"""`exoid investigate`: what it records and when it stops, without a rig and a diagnosis."""
+
+import json
+
+import pytest
+
+from exoid_cli import investigate
+from pipelines.settings.template import create
+from tests.report.sessions import decision_of, write_recording, write_verdict
+
+SEARCH = "[design]\nharmonics = 2\nparticles = 8\niterations = 5\nseconds = 3.0\n"
+COGGING = [
+    ("amplitude", 1.5, "N·m"),
+    ("cycles_per_turn", 9.0, "1/turn"),
+    ("phase", 0.4, "rad"),
+]
+EASY = {"ties": ("rotor_inertia",)}
+"""A motion tells cogging and rotor inertia apart."""
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    create(tmp_path, "exoid")
+    (tmp_path / "exoid.toml").write_text(SEARCH + '[acquire]\nrig = "rigs/plain.toml"\n')
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+@pytest.fixture
+def diagnosed(folder, monkeypatch):
+    """Let each diagnosis have the next of some verdicts; returns the recordings of each."""
+    recorded = []
+
+    def prepare(*decisions):
+        coming = iter(decisions)
+
+        def bring_up_to_date(context, experiment, wanted, before):
+            recorded.append([step.run for step in wanted if step.stage == "acquire"])
+            write_verdict(experiment.out, **decision_of(**next(coming)))
+            file = experiment.out / "diagnosed" / "verdict.json"
+            document = json.loads(file.read_text())
+            document["causes"][0]["parameters"] = [
+                {"name": name, "value": value, "unit": unit, "ci95": [None, None]}
+                for name, value, unit in COGGING
+            ]
+            file.write_text(json.dumps(document))
+
+        monkeypatch.setattr(investigate, "bring_up_to_date", bring_up_to_date)
+        return recorded
+
+    return prepare
+
+
+def test_a_sure_verdict_needs_no_further_run(exoid, folder, diagnosed):
+    recorded = diagnosed({"ties": (), "nothing": 0.01, "law": 0.0})
+    done = exoid("investigate", "--json")
+    assert done.code == 0, done.err
+    document = json.loads(done.out)
+    assert (document["state"], document["stopped_by"]) == ("named", "nothing is left open")
+    assert len(recorded) == 1 and len(recorded[0]) == 4
+    assert not (folder / "investigation").exists()
+
+
+def test_an_open_verdict_leads_to_a_motion_and_all_runs_along_it(exoid, folder, diagnosed):
+    recorded = diagnosed(EASY, {"ties": (), "nothing": 0.01, "law": 0.0})
+    done = exoid("investigate", "--json")
+    assert done.code == 0, done.err
+    assert recorded[1][:4] == recorded[0]
+    assert recorded[1][4:] == [f"{name}+1" for name in recorded[0]]
+    steps = json.loads(done.out)["steps"]
+    assert [one["step"] for one in steps] == [0, 1]
+    assert 0.0 < steps[1]["decides"] <= 1.0
+    before = json.loads((folder / "investigation" / "1" / "verdict.json").read_text())
+    assert (
+        steps[0]["probabilities"]["cogging@knee"] == before["posterior"]["causes"]["cogging@knee"]
+    )
+    assert (folder / "investigation" / "1" / "trajectory.parquet").is_file()
+    # Started again, it has nothing to do.
+    diagnosed({"ties": (), "nothing": 0.01, "law": 0.0})
+    assert exoid("investigate").code == 0
+    assert recorded[2] == recorded[1]
+    assert not (folder / "investigation" / "2").exists()
+
+
+@pytest.mark.parametrize(
+    ("budget", "why"),
+    [
+        ("runs = 3", "another step would make 4 further runs, investigate.runs is 3"),
+        ("minutes = 1.0", "another step would make 2.67 further minutes, investigate.minutes is 1"),
+        ("least_probability = 1.0", "and investigate.least_probability is 1"),
+    ],
+)
+def test_the_budget_ends_it(exoid, folder, diagnosed, budget, why):
+    diagnosed(EASY)
+    with (folder / "exoid.toml").open("a") as file:
+        file.write(f"[investigate]\n{budget}\n")
+    done = exoid("investigate", "--json")
+    assert done.code == 0, done.err
+    document = json.loads(done.out)
+    assert document["state"] == "open"
+    assert why in document["stopped_by"]
+    assert not (folder / "investigation" / "1").exists()
+
+
+def test_where_no_motion_can_decide_it_says_what_can(exoid, folder, monkeypatch):
+    # At the knee Coulomb asymmetry is a torque offset, whatever moves.
+    text = json.dumps(decision_of(ties=("torque_offset",))).replace("cogging", "coulomb_asymmetry")
+
+    def bring_up_to_date(context, experiment, wanted, before):
+        write_verdict(experiment.out, **json.loads(text))
+
+    monkeypatch.setattr(investigate, "bring_up_to_date", bring_up_to_date)
+    done = exoid("investigate")
+    assert done.code == 0, done.err
+    assert "no motion within [design.bounds] separates" in done.out
+    assert "switch the drive off" in done.out
+
+
+def test_recordings_of_other_tools_are_refused(exoid, folder):
+    write_recording(folder, imported={"map": "map.toml"})
+    done = exoid("investigate")
+    assert done.code == 2
+    assert "were imported" in done.err and "`exoid next`" in done.err
+
+
+def test_a_rig_that_only_records_is_refused(exoid, folder):
+    (folder / "rigs" / "plain.toml").write_text("recording_only = true\n")
+    done = exoid("investigate")
+    assert done.code == 2
+    assert "is recording_only" in done.err

@@ -1,0 +1,76 @@
+"""What a verdict leaves open, and what not."""
+
+import json
+
+import pytest
+
+from pipelines.contracts.verdict import read
+from pipelines.investigation.doubt import NOTHING, State, doubt_of
+from tests.report.sessions import decision_of, write_verdict
+
+
+@pytest.fixture
+def doubt(tmp_path):
+    def of(change=lambda document: None, **decision):
+        write_verdict(tmp_path, **decision_of(**decision))
+        file = tmp_path / "diagnosed" / "verdict.json"
+        document = json.loads(file.read_text())
+        change(document)
+        file.write_text(json.dumps(document))
+        return doubt_of(read(file))
+
+    return of
+
+
+def test_ties_are_open(doubt):
+    found = doubt()
+    assert found.state is State.OPEN
+    assert set(found.probabilities) == {"cogging@knee", "parallel_spring@knee"}
+
+
+@pytest.mark.parametrize(("nothing", "state"), [(0.01, State.NAMED), (0.1, State.OPEN)])
+def test_one_cause_is_decided_by_its_probability(doubt, nothing, state):
+    found = doubt(ties=(), nothing=nothing, law=0.0)
+    assert found.state is state
+    if state is State.OPEN:
+        assert found.probabilities == pytest.approx({"cogging@knee": 0.9, NOTHING: 0.1})
+
+
+def test_an_improbable_tie_is_no_rival(doubt):
+    def change(document):
+        first, second = document["findings"][0]["causes"]
+        first["probability"], second["probability"] = 0.93, 0.02
+
+    found = doubt(change, nothing=0.02, law=0.03)
+    assert "parallel_spring@knee" not in found.probabilities
+
+
+def test_a_dropped_cause_is_no_rival(doubt):
+    def change(document):
+        document["findings"][0]["causes"][1]["dropped"] = True
+
+    assert "parallel_spring@knee" not in doubt(change).probabilities
+
+
+def test_where_a_law_has_the_rest_no_motion_can_be_planned(doubt):
+    found = doubt(ties=(), nothing=0.01, law=0.2)
+    assert found.state is State.UNLISTED
+    assert "unlisted law" in found.words
+
+
+def test_nothing_is_decided_unless_a_cause_is_close(doubt):
+    def change(document, close=0.02):
+        document["findings"] = []
+        document["posterior"] |= {"nothing_missing": 0.97 - close, "unlisted": 0.01}
+        document["posterior"]["causes"] = {"cogging@knee": close}
+
+    assert doubt(change).state is State.NOTHING
+    found = doubt(lambda document: change(document, close=0.3))
+    assert found.probabilities == pytest.approx({NOTHING: 0.67, "cogging@knee": 0.3})
+
+
+def test_where_acquisition_is_at_fault_nothing_is_said_of_physics(doubt):
+    def change(document):
+        document.update(acquisition_at_fault=True, posterior=None, findings=[])
+
+    assert doubt(change).state is State.AT_FAULT

@@ -1,0 +1,77 @@
+"""The runs that an investigation adds to an experiment."""
+
+import pytest
+
+from pipelines.errors import SettingsError
+from pipelines.settings import Experiment
+from pipelines.settings.template import create
+from pipelines.workflow.graph import graph
+from pipelines.workflow.imported import ImportedRuns
+from pipelines.workflow.investigation import last_step, motion_of, motions_of, with_investigation
+from pipelines.workflow.split import split
+
+
+@pytest.fixture
+def folder(tmp_path):
+    create(tmp_path, "exoid")
+    for step in (1, 2):
+        motion_of(tmp_path, step).parent.mkdir(parents=True)
+        motion_of(tmp_path, step).touch()
+    return tmp_path
+
+
+def load(folder, imported=ImportedRuns()):
+    return with_investigation(Experiment.load(folder / "exoid.toml"), imported, folder)
+
+
+def test_every_run_is_repeated_in_each_step_with_other_noise(folder):
+    own = Experiment.load(folder / "exoid.toml").run
+    runs = load(folder).run
+    assert len(runs) == 3 * len(own)
+    assert [run.step for run in runs] == [0] * 4 + [1] * 4 + [2] * 4
+    assert len({run.seed for run in runs}) == len(runs)
+    for run in runs[len(own) :]:
+        base = next(one for one in own if run.name == f"{one.name}+{run.step}")
+        kept = ("run", "purpose", "duration_s")
+        assert [getattr(run, key) for key in kept] == [getattr(base, key) for key in kept]
+
+
+def test_adding_them_twice_changes_nothing(folder):
+    once = load(folder)
+    assert with_investigation(once, ImportedRuns(), folder).run == once.run
+
+
+def test_an_imported_run_is_not_repeated(folder):
+    runs = load(folder, ImportedRuns(frozenset({"exo_alone_train"}))).run
+    assert "exo_alone_train" in [run.name for run in runs]
+    assert "exo_alone_train+1" not in [run.name for run in runs]
+
+
+def test_a_step_without_a_motion_and_those_after_it_do_not_count(folder):
+    motion_of(folder, 1).unlink()
+    assert last_step(folder) == 0
+    assert motions_of(folder) == [folder / "trajectory.parquet"]
+
+
+def test_a_run_of_a_step_is_found_by_its_name_alone(folder):
+    experiment = Experiment.load(folder / "exoid.toml")
+    assert experiment.run_named("exo_alone_train+2") == load(folder).run[8]
+    for name in ("exo_alone_train+", "exo_alone_train+x", "nobody+1"):
+        with pytest.raises(SettingsError, match="has no"):
+            experiment.run_named(name)
+
+
+def test_further_runs_follow_their_step_s_motion_and_are_diagnosed_with_the_others(folder):
+    steps = graph(load(folder), folder / "exoid.toml", folder)
+    recorded = {step.run: step for step in steps if step.stage == "acquire"}
+    assert len(recorded) == 12
+    assert folder / "trajectory.parquet" in recorded["exo_alone_train"].inputs
+    assert motion_of(folder, 2) in recorded["exo_alone_train+2"].inputs
+    (diagnosed,) = (step for step in steps if step.stage == "diagnose")
+    assert {step.target for step in recorded.values()} <= set(diagnosed.inputs)
+
+
+def test_make_has_the_same_rules(folder):
+    split(Experiment.load(folder / "exoid.toml"), folder / ".settings")
+    rules = (folder / ".settings" / "graph.mk").read_text()
+    assert "$(OUT)/recordings/exo_alone_train+1.parquet: $(OUT)/investigation/1/" in rules
