@@ -19,7 +19,7 @@ SEEDS ?= tuning
 SESSIONS ?= 2000
 
 .DEFAULT_GOAL := help
-.PHONY: help all test test-slow invariants mutation readability check format bench estimators real fuzz vetoes blind blind-full blind-machines blind-fixed blind-page
+.PHONY: help all investigate test test-slow invariants mutation readability check format bench estimators real fuzz vetoes blind blind-full blind-machines blind-fixed blind-page
 .PHONY: detectability separation evidence learn cross-validation sensitivity docs lock clean install
 
 help: ## this list
@@ -28,6 +28,10 @@ help: ## this list
 all: $(INSTALLED) ## the default experiment from its design to its report, into build/default
 	+@$(EXPERIMENT) all
 	@echo "what is done, stale or missing: $(BIN)/exoid status --config datasets/experiments/default.toml --out build/default"
+
+investigate: $(INSTALLED) ## an experiment whose verdict is not sure, and further ones until it is, into build/undecided; five minutes
+	$(BIN)/exoid investigate --config datasets/experiments/undecided.toml --out build/undecided
+	$(BIN)/exoid run report --config datasets/experiments/undecided.toml --out build/undecided
 
 test: $(INSTALLED) ## the tests
 	$(BIN)/pytest -n 3 --dist loadfile -m "not slow"
