@@ -1,5 +1,6 @@
 """What a file says in words of its values is repeated."""
 
+import numpy as np
 import pytest
 
 from tests.importing.conftest import MAP
@@ -64,3 +65,12 @@ def test_a_comment_between_the_rows_is_repeated_with_its_line(imported, pendulum
     assert "line 1903: 'tare torque: 1.85 N·m removed from here on'" in outcome.printed
     assert outcome.printed.count("the file says") == 1
     assert len(outcome.recording().frame) == 2000
+
+
+def test_a_unit_that_changes_from_row_to_row_is_named(imported, pendulum, write_csv):
+    small = np.abs(pendulum.torque) < 1.0
+    columns = pendulum.columns() | {"torque": np.where(small, 1e3, 1.0) * pendulum.torque}
+    printed = imported(write_csv(columns | {"M unit": np.where(small, "mNm", "Nm")})).printed
+    assert "'M unit' is" in printed and "all read in the unit of the map" in printed
+    printed = imported(write_csv(columns | {"M unit": np.full(len(small), "Nm")})).printed
+    assert "M unit" not in printed
