@@ -13,6 +13,7 @@ from pipelines.importing.naming.unit_in_name import clock_unit_in, unit_in
 from pipelines.importing.quantities.conversion import columns_of
 from pipelines.importing.quantities.numbers import numbers
 from pipelines.importing.sources.source import Columns, Source
+from pipelines.importing.sources.stated import is_altered
 from pipelines.settings.import_map import TimeSettings
 from pipelines.settings.units import ALIASES, UNITS
 
@@ -38,6 +39,7 @@ def contradictions(
     source : Source
         The file.
     """
+    yield from _stated(channels, source)
     yield from _scaling(channels, source)
     yield from _other_units(channels, source)
     yield from _units_above(channels, source)
@@ -45,6 +47,21 @@ def contradictions(
     yield from _other_units_of_clocks(channels, columns, time, source)
     if time.column is not None:
         yield from _clocks_in_the_same_rows(channels, columns, time, source)
+
+
+def _stated(channels: Sequence[Channel], source: Source) -> Iterator[Finding]:
+    """Report what the file says in words of its values, which no map holds."""
+    action = (
+        "read as they are; all that the drive gives must be in its torque, and no zero may move"
+    )
+    for words in source.stated:
+        yield Finding("rows", f"the file says {words}", action)
+    for channel in channels:
+        for name in columns_of(channel.reading, channel.where):
+            if is_altered(source.column_named(name)):
+                yield Finding(
+                    channel.target, f"its name says that it was altered: {name!r}", action
+                )
 
 
 def _scaling(channels: Sequence[Channel], source: Source) -> Iterator[Finding]:

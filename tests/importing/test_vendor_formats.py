@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
+from pipelines.importing.sources.excel import tens_shown
 from tests.importing.conftest import MAP
 from tests.importing.test_formats import BAG_MAP, assert_is_the_pendulum
 
@@ -68,6 +69,38 @@ def test_a_share_of_a_workbook_is_read_in_the_per_cent_that_it_is_shown_in(
     text = MAP.replace('torque = { column = "torque", unit = "N·m" }', share)
     assert share in text
     frame = imported(tmp_path / "log.xlsx", map_text=text).recording().frame
+    assert_allclose(frame["pivot_torque_nm"], pendulum.torque[:300], atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("number_format", "tens"),
+    [
+        ("General", 0),
+        ("#,##0.00", 0),
+        ("#,##0", 0),
+        ("0.000,", -3),
+        ("#,##0,", -3),
+        ("0,.00", -3),
+        ("0.0,,", -6),
+        ('0.0,"k"', -3),
+        ('0.0" Nm, raw"', 0),
+        ("0.0%", 2),
+        ("[Red]0.0,;-0.0,", -3),
+    ],
+)
+def test_a_comma_behind_the_last_digit_divides_by_a_thousand(number_format, tens):
+    assert tens_shown(number_format) == tens
+
+
+def test_cells_that_are_shown_in_thousands_are_read_as_shown(imported, pendulum, tmp_path):
+    openpyxl = pytest.importorskip("openpyxl")
+    book = openpyxl.Workbook()
+    book.active.append(["time", "angle", "velocity", "torque"])
+    for *others, torque in list(zip(*pendulum.columns().values(), strict=True))[:300]:
+        book.active.append([*map(float, others), 1e3 * float(torque)])
+        book.active.cell(book.active.max_row, 4).number_format = "0.000,"
+    book.save(tmp_path / "log.xlsx")
+    frame = imported(tmp_path / "log.xlsx").recording().frame
     assert_allclose(frame["pivot_torque_nm"], pendulum.torque[:300], atol=1e-12)
 
 

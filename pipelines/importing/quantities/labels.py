@@ -1,4 +1,4 @@
-"""Columns that say of which machine a row is, or whether its values are good."""
+"""Columns that say of which machine or in which unit a row is, or whether its values are good."""
 
 from collections.abc import Iterator, Mapping, Sequence
 
@@ -18,6 +18,8 @@ MACHINES = frozenset(word for words in _OF_MACHINES for word in words.split())
 """Words for a machine or a joint of which a row may be."""
 GOOD = frozenset({"quality", "valid", "validity", "qualitaet", "gueltig", "qualite", "valide"})
 """Words for a column that says whether others have good values."""
+UNITS = frozenset({"unit", "units", "einheit", "einheiten", "unite", "unites"})
+"""Words for a column of the unit of each row, as of a display that changes its range."""
 NUMBER = frozenset({"number", "no", "nr", "name", "code", "address", "addr", "num", "nummer"})
 MOST = 20
 """Values of a label; a column with more is a quantity."""
@@ -33,7 +35,9 @@ def _kind(name: str) -> str:
     if words & GOOD:
         return "quality"
     only = {word for word in words if not word.isdigit()}
-    return "machine" if only & MACHINES and only <= MACHINES | NUMBER else ""
+    if only & MACHINES and only <= MACHINES | NUMBER:
+        return "machine"
+    return "unit" if words & UNITS else ""
 
 
 def check(labels: Mapping[str, NDArray]) -> Iterator[Finding]:
@@ -56,6 +60,8 @@ def check(labels: Mapping[str, NDArray]) -> Iterator[Finding]:
         some = ", ".join(f"{value} in {counted(n, 'row')}" for value, n in counts[:3].items())
         if _kind(name) == "quality":
             action = "all kept; delete rows whose values are no measurements"
+        elif _kind(name) == "unit":
+            action = "all read in the unit of the map; let the logger write one unit in all rows"
         else:
             action = "all kept as one machine; if they are of several, give each a file of its own"
         yield Finding("rows", f"{name!r} is {some}", action)

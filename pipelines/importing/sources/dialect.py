@@ -19,6 +19,7 @@ from pipelines.importing.sources.header import (
     units_of,
 )
 from pipelines.importing.sources.source import numbered_twins
+from pipelines.importing.sources.stated import said_to_be_altered
 from pipelines.settings.base import repeated
 from pipelines.settings.import_map import SourceSettings
 
@@ -66,6 +67,8 @@ class Dialect:
     fields_above: tuple[str, ...]
     """Fields above the rows, where those are not the names of the columns."""
     notes: tuple[str, ...]
+    stated: tuple[str, ...]
+    """Lines above the rows that say that values were corrected."""
     remark: str
     """How the names follow from a header that does not fit; empty where it does."""
 
@@ -153,6 +156,7 @@ def find_dialect(start: bytes, whole: bool, settings: SourceSettings) -> Dialect
         {apart[k]: text for k, text in table.scaling(below).items()},
         table.fields(below) if settings.columns or named.remark else (),
         (*notes, remark) if remark else tuple(notes),
+        said_to_be_altered(table.lines_above(below), apart),
         remark,
     )
 
@@ -232,31 +236,32 @@ class _Table:
         )
         # Between spaces no field is blank: a row with fewer fields lacks any one of them.
         return header(
-            self._above(lines), self.width, counts_rows, may_be_longer=self.delimiter != " "
+            self.lines_above(lines), self.width, counts_rows, may_be_longer=self.delimiter != " "
         )
 
     def scaling(self, lines: Sequence[str]) -> dict[int, str]:
         """Return the factors and offsets above the rows, by the places of their columns."""
-        return scaling_of(self._above(lines), self.width)
+        return scaling_of(self.lines_above(lines), self.width)
 
     def units(self, lines: Sequence[str]) -> dict[int, str]:
         """Return the units that a line, or cells left of the rows, give to columns by places."""
         # Rows left of which settings may stand.
         settings = 50
         of_rows = units_left_of([row for _, row in self.blocks[0][:settings]], self.numeric)
-        return of_rows | units_of(self._above(lines), self.width)
+        return of_rows | units_of(self.lines_above(lines), self.width)
 
     def fields(self, lines: Sequence[str]) -> tuple[str, ...]:
         """Return the fields of all lines above the rows."""
-        return tuple(field for line in self._above(lines) for field in line if field)
+        return tuple(field for line in self.lines_above(lines) for field in line if field)
 
     def heads(self, lines: Sequence[str]) -> tuple[frozenset[str], ...]:
         """Return the words above each column."""
-        above = self._above(lines)
+        above = self.lines_above(lines)
         widest = max(map(len, above), default=0)
         return tuple(frozenset(line[k] for line in above if k < len(line)) for k in range(widest))
 
-    def _above(self, lines: Sequence[str]) -> list[list[str]]:
+    def lines_above(self, lines: Sequence[str]) -> list[list[str]]:
+        """Return the fields of the lines above the rows."""
         # Many tools write the header as a comment, so its mark is removed.
         strip = "".join(self.marks) + " "
         return [_fields(line.lstrip(strip), self.delimiter) for line in lines[: self.first]]

@@ -75,14 +75,20 @@ def _cells(row: tuple[Any, ...]) -> list[str]:
 
 
 def _shown(cell: Any) -> Any:
-    """Return the value of a cell; a share that is shown in per cent, 0.153 as 15.3 %, in these."""
+    """Return the value of a cell as Excel shows it: 0.153 as 15.3 %, 1830 as 1.83 thousand."""
     is_number = isinstance(cell.value, int | float) and not isinstance(cell.value, bool)
-    if is_number and _is_percentage(cell.number_format):
-        return Decimal(repr(cell.value)).scaleb(2)
+    if is_number and (tens := tens_shown(cell.number_format)):
+        return Decimal(repr(cell.value)).scaleb(tens)
     return cell.value
 
 
 @cache
-def _is_percentage(number_format: str) -> bool:
-    """Return whether Excel multiplies numbers by 100, as for a % that is no mere text."""
-    return "%" in re.sub(r'"[^"]*"|\\.|_.|\*.', "", number_format)
+def tens_shown(number_format: str) -> int:
+    """Return by how many powers of ten Excel shifts a number: 2 for each %, -3 for a last comma.
+
+    A comma scales where it follows the last place for a digit; among places it parts thousands.
+    """
+    # Without mere text, colours and conditions; another section is for other signs.
+    bare = re.sub(r'"[^"]*"|\\.|_.|\*.|\[[^]]*\]', "", number_format).partition(";")[0]
+    last = re.search(r"[0#?](,+)(?=[^0#?,]*$|\.)", bare)
+    return 2 * bare.count("%") - 3 * (len(last[1]) if last else 0)

@@ -139,6 +139,7 @@ def joined(sources: Sequence[Source], clock: str, others: Collection[str] = ()) 
         units=units,
         clocks=clocks,
         scaling=scaling,
+        stated=tuple(f"{one.path.name}, {words}" for one in sources for words in one.stated),
         remarks=(*(remark for one in sources for remark in one.remarks), remark),
     )
 

@@ -33,6 +33,8 @@ class Source:
     """Fields above the rows that are no names of columns, because the map or numbers name them."""
     remarks: tuple[str, ...] = ()
     """What was not as it should be, for the user."""
+    stated: tuple[str, ...] = ()
+    """What the file says in words of how its values came about, and where."""
     aliases: Mapping[str, str] = field(default_factory=dict)
     """Other names that a map may use, and the columns that they mean."""
 

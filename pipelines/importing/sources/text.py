@@ -2,6 +2,7 @@
 
 import re
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from io import BytesIO
 from pathlib import Path
 from typing import Any
@@ -14,6 +15,7 @@ from pipelines.errors import InputError
 from pipelines.importing.decimal_marks import as_written
 from pipelines.importing.sources.dialect import Dialect, find_dialect, is_value
 from pipelines.importing.sources.source import Columns, Source
+from pipelines.importing.sources.stated import comments_between
 from pipelines.settings.import_map import SourceSettings
 
 BEYOND = "\0beyond"
@@ -37,7 +39,8 @@ def open_text(path: Path, settings: SourceSettings) -> Source:
             start += more
         whole = not file.read(1)
     dialect = find_dialect(start, whole, settings)
-    return _source(path, "text", dialect, lambda: path)
+    between = comments_between(path, dialect.comment, dialect.encoding, dialect.rows_before)
+    return _source(path, "text", replace(dialect, stated=dialect.stated + between), lambda: path)
 
 
 def open_lines(path: Path, format: str, text: str, settings: SourceSettings) -> Source:
@@ -64,6 +67,7 @@ def _source(path: Path, format: str, dialect: Dialect, content: Callable[[], Any
         clocks=dialect.clocks,
         scaling=dialect.scaling,
         fields_above=dialect.fields_above,
+        stated=dialect.stated,
         remarks=(dialect.remark,) if dialect.remark else (),
     )
 
