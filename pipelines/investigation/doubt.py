@@ -52,8 +52,9 @@ def doubt_of(verdict: Verdict) -> Doubt:
             f" {posterior.nothing_missing:.2f})",
         )
     unsettled = [one for one in verdict.findings if not _is_settled(one)]
+    named = {one.label for finding in verdict.findings for one in finding.causes}
     for finding in unsettled:
-        rivals = _rivals(finding, posterior)
+        rivals = _rivals(finding, posterior, named)
         if len(rivals) > 1:
             return _open(rivals)
     if unsettled:
@@ -63,8 +64,8 @@ def doubt_of(verdict: Verdict) -> Doubt:
             f"open: {one.words} ({one.probability:.2f}), or an unlisted law, which no motion can be"
             " planned for",
         )
-    named = ", ".join(f"{f.words} ({f.probability:.2f})" for f in verdict.findings)
-    return Doubt(State.NAMED, f"decided: {named}")
+    settled = ", ".join(f"{f.words} ({f.probability:.2f})" for f in verdict.findings)
+    return Doubt(State.NAMED, f"decided: {settled}")
 
 
 def _open(rivals: dict[str, float]) -> Doubt:
@@ -78,15 +79,27 @@ def _is_settled(finding: Finding) -> bool:
     return finding.level == "cause" and alone >= DECIDED
 
 
-def _rivals(finding: Finding, posterior: Posterior) -> dict[str, float]:
-    """Return the rivals of a finding; fewer than two where there is no choice."""
+def _rivals(finding: Finding, posterior: Posterior, named: set[str]) -> dict[str, float]:
+    """Return the rivals of a finding; fewer than two where there is no choice.
+
+    ``named`` has the labels of the causes of all findings.
+    """
     rivals = {
         one.label: one.probability
         for one in finding.causes
         if not one.dropped and one.probability >= CLOSE
     }
-    # The rest is that this finding is none, or an unlisted law, of which nothing can be planned.
+    if finding.level != "cause":
+        return rivals
+    # An unlisted law is a rival of which nothing can be planned.
     rest = 1.0 - finding.probability - posterior.unlisted
-    if finding.level == "cause" and rest >= CLOSE:
+    for label, p in posterior.causes.items():
+        if label not in named and CLOSE <= p <= rest:
+            rivals[label] = p
+            rest -= p
+    if rest >= CLOSE:
         rivals[NOTHING] = rest
+    elif len(rivals) == 1 and posterior.unlisted < CLOSE:
+        # The rest is spread, and the nearest is that this finding is none.
+        rivals[NOTHING] = 1.0 - finding.probability
     return rivals

@@ -41,9 +41,8 @@ class Separation:
 
     rivals: tuple[SizedRival, ...]
     truths: tuple[NDArray, ...]
-    """Torque of each rival as the true cause, (n, rows), at its n probable shapes."""
-    spreads: tuple[NDArray, ...]
-    """Standard deviation of that torque in further runs, (n, rows), as earlier ones have noise."""
+    """Rows without noise of each rival as the true cause, (n, rows), at its n probable sizes.
+    Diagnosed runs have what they showed, whichever is true."""
     shapes: tuple[tuple[Appearance, ...], ...]
     """Each rival at all shapes with which it could explain another one."""
     price: float
@@ -51,8 +50,8 @@ class Separation:
     noise: NDArray
     """(rows,) its standard deviation; below one where the model's error counts, and zero in runs
     that were diagnosed: what they showed is known."""
-    seen: NDArray
-    """(rows,) what the runs show of the first cause, unweighted."""
+    unweighted: tuple[NDArray, ...]
+    """As ``truths``, without weights, and with each rival's own torque in diagnosed runs."""
     earlier: "Separation | None"
     """The same in the diagnosed runs alone, whose result is the rivals' probability."""
 
@@ -76,37 +75,31 @@ class Separation:
         diagnosed : int, optional
             How many of the problem's runs, the first ones, these are.
         """
-        truths = [[truth.torque(problem) for truth in sized.truths] for sized in rivals]
-        # The mean over all truths: the rivals stand for one torque.
-        squares = np.mean(np.square(list(itertools.chain(*truths))), axis=0)
-        explained = np.bincount(problem.outputs, squares, minlength=len(problem.root))
-        weights = power(explained, 1.0, CRITERIA.model_error)
-        weighted = problem.weighted(weights)
-        seen = next(itertools.chain(*truths))
-        nothing = _of_nothing(earlier.seen if earlier else seen, weights, weighted)
-        counts = (int(run.usable.sum()) for run in problem.runs)
-        is_planned = np.concatenate([np.full(n, r >= diagnosed) for r, n in enumerate(counts)])
-        no_span = Appearance(np.zeros((len(is_planned), 0)))
-        of_truths = tuple(
-            np.array([truth.torque(weighted) for truth in sized.truths] or [nothing])
+        rows = len(problem.outputs)
+        own = tuple(
+            np.array([truth.torque(problem) for truth in sized.truths] or [np.zeros(rows)])
             for sized in rivals
         )
-        spreads = tuple(np.zeros_like(own) for own in of_truths)
-        if earlier:
-            for own, known, sized in zip(spreads, earlier.truths, rivals, strict=True):
-                for row, before, truth in zip(own, known, sized.truths, strict=False):
-                    row += truth.torque(weighted, diagnosed) / np.sqrt(_squared(before))
+        weights = _weights(own, problem)
+        weighted = problem.weighted(weights)
+        root = np.sqrt(weights[problem.outputs])
+        counts = (int(run.usable.sum()) for run in problem.runs)
+        is_planned = np.concatenate([np.full(n, r >= diagnosed) for r, n in enumerate(counts)])
+        known = earlier.unweighted if earlier else tuple(one * ~is_planned for one in own)
+        no_span = Appearance(np.zeros((rows, 0)))
         return cls(
             tuple(rivals),
-            of_truths,
-            spreads,
+            tuple(
+                _with_known(one, before, _seen(sized, rivals, known), root, weighted)
+                for one, before, sized in zip(own, known, rivals, strict=True)
+            ),
             tuple(
                 tuple(Appearance.of(shape, weighted) for shape in sized.shapes) or (no_span,)
                 for sized in rivals
             ),
             0.5 * float(np.log(problem.independent)),
-            is_planned * np.sqrt(weights[problem.outputs]),
-            seen,
+            is_planned * root,
+            own,
             earlier,
         )
 
@@ -131,15 +124,29 @@ class Separation:
         return self._odds(priced=False)
 
     def _odds(self, priced: bool) -> NDArray:
-        result = np.zeros((len(self.rivals), len(self.rivals)))
-        for i, j in itertools.permutations(range(len(self.rivals)), 2):
-            prices = self.prices(j) if priced else np.zeros(len(self.shapes[j]))
-            own = self.prices(i).min() if priced else 0.0
-            result[i, j] = np.mean(
-                [_against(one, self.shapes[j], prices) for one in self.truths[i]]
-            )
-            result[i, j] -= own
-        return result if self.earlier is None else result - self.earlier._odds(priced=False)
+        return np.array([one.mean(axis=0) for one in self._odds_of_truths(priced)])
+
+    def _odds_of_truths(self, priced: bool) -> list[NDArray]:
+        """Return the expected log odds of each size of each truth, (n, R)."""
+        result = []
+        for i, truths in enumerate(self.truths):
+            lost = np.array(
+                [
+                    np.min(
+                        [
+                            -0.5 * _squared(truths @ one.span) + priced * price
+                            for one, price in zip(shapes, self.prices(j), strict=True)
+                        ],
+                        axis=0,
+                    )
+                    for j, shapes in enumerate(self.shapes)
+                ]
+            ).T
+            result.append(lost - lost[:, i : i + 1])
+        if self.earlier is None:
+            return result
+        earlier = self.earlier._odds_of_truths(priced=False)
+        return [now - before for now, before in zip(result, earlier, strict=True)]
 
     def log_loss(self) -> float:
         """Return the expected log loss of the posterior, bounded pair by pair.
@@ -150,11 +157,13 @@ class Separation:
         nodes, parts = np.polynomial.hermite_e.hermegauss(15)
         parts /= parts.sum()
         prior = np.array([sized.rival.probability for sized in self.rivals])
-        mean = np.maximum(self.distances(), 0.0)[:, :, np.newaxis]
-        against = np.log(prior[np.newaxis, :] / prior[:, np.newaxis])[:, :, np.newaxis]
-        odds = mean + np.sqrt(2.0 * mean) * nodes - against
-        losses = np.logaddexp(0.0, -odds) @ parts
-        return float(prior @ (losses * ~np.eye(len(prior), dtype=bool)).sum(axis=1))
+        loss = 0.0
+        for i, odds in enumerate(self._odds_of_truths(priced=False)):
+            mean = np.maximum(odds, 0.0)[:, :, np.newaxis]
+            against = np.log(prior / prior[i])[:, np.newaxis]
+            lost = np.logaddexp(0.0, against - mean - np.sqrt(2.0 * mean) * nodes) @ parts
+            loss += prior[i] * float(np.delete(lost, i, axis=1).sum(axis=1).mean())
+        return loss
 
     def prices(self, rival: int) -> NDArray:
         """Return the log likelihood that the amplitudes of each shape of a rival cost, (shapes,).
@@ -245,8 +254,7 @@ class Separation:
         result = np.zeros((len(self.rivals), draws, len(self.rivals)))
         for i, own in enumerate(self.truths):
             of_draw = np.arange(draws) % len(own)
-            spread = rng.standard_normal((draws, 1)) * self.spreads[i][of_draw]
-            y = own[of_draw] + spread + rng.standard_normal((draws, len(self.noise))) * self.noise
+            y = own[of_draw] + rng.standard_normal((draws, len(self.noise))) * self.noise
             log = self._evidence(y, prices) + prior
             if self.earlier:
                 free = [np.zeros(len(own)) for own in self.shapes]
@@ -270,25 +278,54 @@ class Separation:
         return np.array(of_rivals).T
 
 
-def _of_nothing(seen: NDArray, weights: NDArray, weighted: DetectionProblem) -> NDArray:
-    """Return what runs show if nothing is missing, (rows,).
+def _weights(truths: Sequence[NDArray], problem: DetectionProblem) -> NDArray:
+    """Return the weight of each output, (O,), by the mean power of all truths there."""
+    # The mean over all causes: the rivals stand for one torque.
+    squares = np.mean([np.mean(one * one, axis=0) for one in truths if one.any()], axis=0)
+    explained = np.bincount(problem.outputs, squares, minlength=len(problem.root))
+    return power(explained, 1.0, CRITERIA.model_error)
 
-    By chance, the diagnosed runs have shown what each of the causes would have made; the further
-    ones show nothing.
+
+def _seen(
+    sized: SizedRival, rivals: Sequence[SizedRival], known: Sequence[NDArray]
+) -> NDArray | None:
+    """Return what the diagnosed runs showed, (rows,) or, if each truth is as it was seen, None."""
+    pairs = list(zip(rivals, known, strict=True))
+    fitted = [own for one, own in pairs if one.rival.term]
+    if not fitted and sized.rival.effect:
+        return None
+    # Without a fitted cause, nothing has by chance looked like the first one.
+    return (fitted or [own for one, own in pairs if one.rival.effect])[0].mean(axis=0)
+
+
+def _with_known(
+    truths: NDArray,
+    known: NDArray,
+    seen: NDArray | None,
+    root: NDArray,
+    weighted: DetectionProblem,
+) -> NDArray:
+    """Return the rows (n, rows) of some truths, with what diagnosed runs showed.
+
+    Parameters
+    ----------
+    truths : (n, rows) array
+        Their torque, unweighted.
+    known : (n, diagnosed) array
+        Their torque in the diagnosed runs alone, which are the first rows.
+    seen : (diagnosed,) array or None
+        What these runs showed; None where it is what each truth makes.
+    root : (rows,) array
+        Roots of the weights.
+    weighted : DetectionProblem
+        With these weights.
     """
-    rows = np.zeros(len(weighted.outputs))
-    rows[: len(seen)] = seen
-    rows *= np.sqrt(weights[weighted.outputs])
-    return rows - weighted.basis @ (weighted.basis.T @ rows)
-
-
-def _against(truth: NDArray, rivals: Sequence[Appearance], prices: NDArray) -> float:
-    """Return the expected log odds of a truth against the rival shape that is most alike."""
-    of_truth = _squared(truth)
-    return min(
-        0.5 * float(of_truth - _squared(rival.span.T @ truth)) + price
-        for rival, price in zip(rivals, prices, strict=True)
-    )
+    # What differs from a truth there is noise, and not a motion of the baseline's parameters.
+    rows = truths.copy()
+    if seen is not None:
+        rows[:, : known.shape[1]] += seen - known
+    rows *= root
+    return rows - (rows @ weighted.basis) @ weighted.basis.T
 
 
 def decided(posterior: NDArray) -> NDArray:

@@ -5,7 +5,7 @@ comes closest to it.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,8 +32,8 @@ class Truth:
     linear: NDArray | None = None
     """(k,) amplitudes; None for a first amplitude of 1, with others that suit it."""
 
-    def torque(self, problem: DetectionProblem, first: int = 0) -> NDArray:
-        """Return its torque in the rows of a problem, (rows,), from its run ``first`` on.
+    def torque(self, problem: DetectionProblem) -> NDArray:
+        """Return its torque in the rows of a problem, (rows,).
 
         Without what the baseline explains, in units of the noise.
         """
@@ -42,7 +42,6 @@ class Truth:
             parts = _direction(candidate, problem)
         else:
             parts = [c @ self.linear[:, np.newaxis] for c in _parts(candidate, problem)]
-        parts = [(r >= first) * part for r, part in enumerate(parts)]
         return self.factor * problem.remainder(parts)[:, 0]
 
 
@@ -123,21 +122,28 @@ def sized(rivals: Sequence[Rival], problem: DetectionProblem) -> list[SizedRival
                 f"{effect.label} cannot show in planned runs, which have no temperatures; give"
                 f" `exoid design {SETTING}` the other causes"
             )
-    fitted = {rival.label: _fitted(rival.term, problem) for rival in rivals if rival.term}
     nothing = sum(rival.probability for rival in rivals if rival.effect is None)
     length = _seen_length(nothing, problem) if nothing > 0.0 else None
-    seen = None
-    if fitted:
-        seen = next(iter(fitted.values())).torque(problem)
-        factor = min(1.0, length / float(np.linalg.norm(seen))) if length else 1.0
-        seen = factor * seen
-        fitted = {label: replace(one, factor=factor) for label, one in fitted.items()}
-    return [_sized(rival, fitted.get(rival.label), seen, length, problem) for rival in rivals]
+    seen = _seen(rivals, length, problem)
+    return [_sized(rival, seen, length, problem) for rival in rivals]
 
 
-def _fitted(term: Term, problem: DetectionProblem) -> Truth:
-    candidate = Candidate(term.effect, (tuple(term.shape.tolist()),) * len(problem.runs))
-    return Truth(candidate, 1.0, None if candidate.transforms_motion else term.linear)
+def _seen(
+    rivals: Sequence[Rival], length: float | None, problem: DetectionProblem
+) -> NDArray | None:
+    """Return the torque that runs showed, (rows,), at most so long; None without a fitted rival."""
+    term = next((rival.term for rival in rivals if rival.term), None)
+    if term is None:
+        return None
+    candidate = _candidate(term, problem)
+    linear = None if candidate.transforms_motion else term.linear
+    seen = Truth(candidate, 1.0, linear).torque(problem)
+    size = float(np.linalg.norm(seen))
+    return seen * min(1.0, length / size) if length is not None and size > 0.0 else seen
+
+
+def _candidate(term: Term, problem: DetectionProblem) -> Candidate:
+    return Candidate(term.effect, (tuple(term.shape.tolist()),) * len(problem.runs))
 
 
 def _seen_length(nothing: float, problem: DetectionProblem) -> float:
@@ -151,18 +157,15 @@ def _seen_length(nothing: float, problem: DetectionProblem) -> float:
 
 
 def _sized(
-    rival: Rival,
-    fitted: Truth | None,
-    seen: NDArray | None,
-    length: float | None,
-    problem: DetectionProblem,
+    rival: Rival, seen: NDArray | None, length: float | None, problem: DetectionProblem
 ) -> SizedRival:
     if rival.effect is None:
         return SizedRival(rival, (), ())
     grid = list(shapes_of(rival.effect, problem.runs))
-    if fitted is not None:
-        return SizedRival(rival, (fitted,), (fitted.candidate, *grid))
-    if seen is not None:
+    if rival.term is not None:
+        own = _candidate(rival.term, problem)
+        truths, grid = _as_seen([own], seen, problem), [own, *grid]
+    elif seen is not None:
         truths = _as_seen(grid, seen, problem)
     else:
         # A shape that these runs do not show has no size.
@@ -176,20 +179,41 @@ def _sized(
     return SizedRival(rival, tuple(truths), tuple(grid))
 
 
-def _as_seen(grid: Sequence[Candidate], seen: NDArray, problem: DetectionProblem) -> list[Truth]:
+def _as_seen(
+    grid: Sequence[Candidate], seen: NDArray | None, problem: DetectionProblem
+) -> list[Truth]:
     """Return the shapes that explain a torque (rows,) about as well as the best one does."""
     # Log likelihood by which a shape may be worse: the others have an eighth of its probability.
     tolerance = 2.0
-    truths, explained = [], []
+    truths, explained = list[list[Truth]](), list[float]()
     for candidate in grid:
         columns = problem.remainder(_parts(candidate, problem))
-        linear = np.linalg.lstsq(columns, seen, rcond=1e-9)[0]
-        gain = 0.5 * float(seen @ columns @ linear)
-        if gain > 0.0:
-            truths.append(Truth(candidate, 1.0, linear))
-            explained.append(gain)
+        gram = columns.T @ columns + np.diag(1.0 / _typical(candidate) ** 2)
+        if not columns.any():
+            continue
+        linear = np.linalg.solve(gram, columns.T @ seen)
+        explained.append(0.5 * float(seen @ columns @ linear))
+        truths.append(_around(candidate, linear, np.linalg.inv(gram)))
     best = max(explained, default=0.0)
-    return [one for one, gain in zip(truths, explained, strict=True) if gain >= best - tolerance]
+    pairs = zip(truths, explained, strict=True)
+    return [one for own, gain in pairs if gain >= best - tolerance for one in own]
+
+
+def _typical(candidate: Candidate) -> NDArray:
+    """Return a standard deviation of each amplitude before any data, (k,); two are typical."""
+    if candidate.transforms_motion:
+        return np.ones(1)  # of the size at which the shape is
+    return np.array([0.5 * np.max(np.abs(p.typical)) for p in candidate.effect.linear])
+
+
+def _around(candidate: Candidate, linear: NDArray, covariance: NDArray) -> list[Truth]:
+    """Return a candidate at the 2 k cubature points of its amplitudes' distribution.
+
+    They have its mean and covariance: amplitudes are only as well known as the runs show them.
+    """
+    variances, axes = np.linalg.eigh(covariance)
+    steps = axes * np.sqrt(len(linear) * np.maximum(variances, 0.0))
+    return [Truth(candidate, 1.0, linear + sign * step) for step in steps.T for sign in (1.0, -1.0)]
 
 
 def _factor(candidate: Candidate, length: float | None, problem: DetectionProblem) -> float:

@@ -14,7 +14,7 @@ from pipelines.investigation.planned import PlannedRuns
 from pipelines.investigation.rivals import Rival, rivals_in_verdict, rivals_named
 from pipelines.investigation.separating_design import separating_design
 from pipelines.investigation.separation_problem import SeparationProblem
-from pipelines.investigation.sized_rival import sized
+from pipelines.investigation.sized_rival import Truth, sized
 from pipelines.mechanics.geometry import Geometry
 from pipelines.mechanics.limits import margins
 from pipelines.mechanics.machine import THE_LEG
@@ -151,13 +151,17 @@ def test_a_cause_without_torque_in_the_last_excitation_is_refused(usual):
         of_size(resting, 1.0, "base_tilt", "quadratic_drag@knee")
 
 
+def mean_of(truths, problem):
+    return np.mean([one.torque(problem) for one in truths], axis=0)
+
+
 def test_a_tie_of_a_fitted_cause_makes_its_torque(usual):
     asymmetry, offset = named("coulomb_asymmetry@hip", "torque_offset@hip")
     fitted = Rival(asymmetry.effect, 0.6, Term(asymmetry.effect, np.array([-2.0])))
     problem = RUNS.problem(usual, [fitted.effect, offset.effect])
-    (own,), (other,) = (one.truths for one in sized([fitted, offset], problem))
-    assert own.linear == pytest.approx([-2.0])
-    assert other.torque(problem) == pytest.approx(own.torque(problem), abs=1e-6)
+    own, other = (one.truths for one in sized([fitted, offset], problem))
+    assert np.mean([one.linear for one in own]) == pytest.approx(-2.0, rel=0.05)
+    assert mean_of(other, problem) == pytest.approx(mean_of(own, problem), rel=0.01, abs=0.01)
 
 
 def test_a_tie_may_be_a_part_of_the_fitted_cause(usual):
@@ -165,8 +169,19 @@ def test_a_tie_may_be_a_part_of_the_fitted_cause(usual):
     spring, offset = named("parallel_spring@knee", "torque_offset@knee")
     fitted = Rival(spring.effect, 0.6, Term(spring.effect, np.array([0.0, 3.0])))
     problem = RUNS.problem(usual, [fitted.effect, offset.effect])
-    _, (other,) = (one.truths for one in sized([fitted, offset], problem))
-    assert abs(other.linear) == pytest.approx([3.0])
+    _, other = (one.truths for one in sized([fitted, offset], problem))
+    assert abs(np.mean([one.linear for one in other])) == pytest.approx(3.0, rel=0.05)
+
+
+def test_an_amplitude_is_as_well_known_as_the_runs_show_it(usual):
+    spring = named(*EASY)[0]
+    problem = RUNS.problem(usual, [spring.effect])
+    fitted = Rival(spring.effect, 1.0, Term(spring.effect, np.array([7.0, 2.0])))
+    truths = sized([fitted], problem)[0].truths
+    linear = np.array([one.linear for one in truths])
+    units = [Truth(truths[0].candidate, 1.0, one).torque(problem) for one in np.eye(2)]
+    known = np.linalg.inv(np.array(units) @ np.transpose(units) + np.diag([20.0**-2, 15.0**-2]))
+    assert np.cov(linear.T, bias=True) == pytest.approx(known, rel=1e-6)
 
 
 def test_what_is_hardly_seen_is_small(usual):
@@ -195,20 +210,23 @@ def test_after_a_diagnosis_the_same_motion_again_tells_a_cause_from_nothing(usua
 
 def test_expected_posteriors_are_calibrated(usual):
     spring, inertia = (one.effect for one in named(*EASY))
-    rivals = [Rival(spring, 0.5), Rival(inertia, 0.3), Rival(None, 0.2)]
+    fitted = Term(spring, np.array([1.5, 0.0]))
+    rivals = [Rival(spring, 0.5, fitted), Rival(inertia, 0.3), Rival(None, 0.2)]
     problem = SeparationProblem.of(rivals, RUNS.after([usual]), usual)
     posterior = problem.with_motion(usual).posterior(draws=4000)
     # Of experiments drawn with these probabilities, those that say p are right in p of all cases.
-    for rival in range(3):
-        said = posterior[:, :, rival].ravel()
-        right = np.repeat(np.arange(3) == rival, posterior.shape[1])
-        weight = np.repeat([0.5, 0.3, 0.2], posterior.shape[1])
-        for low, high in ((0.0, 0.1), (0.1, 0.5), (0.5, 0.9), (0.9, 1.01)):
-            here = (low <= said) & (said < high)
-            if np.sum(weight[here]) > 100.0:
-                share = np.average(right[here], weights=weight[here])
-                mean = np.average(said[here], weights=weight[here])
-                assert share == pytest.approx(mean, abs=0.15)
+    said = posterior.transpose(2, 0, 1).reshape(3, -1)
+    right = np.repeat(np.eye(3), posterior.shape[1], axis=1)
+    weight = np.repeat([0.5, 0.3, 0.2], posterior.shape[1])
+    for low, high in ((0.0, 0.1), (0.1, 0.5), (0.5, 0.9), (0.9, 1.01)):
+        here = (low <= said) & (said < high)
+        weights = np.broadcast_to(weight, said.shape)[here]
+        assert weights.sum() > 100.0
+        share, mean = (
+            np.average(right[here], weights=weights),
+            np.average(said[here], weights=weights),
+        )
+        assert share == pytest.approx(mean, abs=0.1), (low, high)
 
 
 def test_a_verdict_s_ties_are_rivals_with_its_probabilities_and_noise(tmp_path):
