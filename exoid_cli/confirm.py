@@ -23,26 +23,10 @@ def confirm(
     sample_rate_hz: float,
 ) -> None:
     """Show the motion and the limits in force, and ask; any answer but yes is an InputError."""
-    import numpy as np
-
     from pipelines.acquisition.safety.limits import HOLD_SAMPLES
 
     _require_terminal(f"run {run.name} moves a person")
-    # An excitation repeats, so one period has its extremes.
-    seconds = min(run.duration_s, motion.period_s or run.duration_s)
-    angles, velocities = motion.at(np.arange(0.0, seconds, 1.0 / sample_rate_hz))[:2]
-    lines = [
-        f"Run {run.name} moves a person on the rig {rig.name} along {trajectory} for"
-        f" {run.duration_s:g} s:"
-    ]
-    for j, drive in enumerate(rig.drive):
-        angle, speed = angles[:, j], abs(velocities[:, j]).max()
-        low, high = drive.angle_rad
-        lines.append(
-            f"  {drive.joint:<5} {angle.min():+.3f} to {angle.max():+.3f} rad at up to {speed:.3f}"
-            f" rad/s; limits {low:+g} to {high:+g} rad, {drive.speed_rad_s:g} rad/s,"
-            f" {drive.torque_nm:g} N·m"
-        )
+    lines = _motion_in_words("a person", rig, run, trajectory, motion, sample_rate_hz)
     cuffs = "none on the cuffs"
     if rig.sensor:
         cuffs = f"{rig.safety.cuff_force_n:g} N on {len(rig.sensor)} cuff sensors"
@@ -61,11 +45,41 @@ def confirm(
     _ask("Is everybody ready, and the emergency stop at hand?", f"run {run.name}")
 
 
+def _motion_in_words(
+    who: str,
+    rig: "RigSettings",
+    run: "RunSettings",
+    trajectory: Path,
+    motion: "Trajectory",
+    sample_rate_hz: float,
+) -> list[str]:
+    """Return lines that say how a run moves each joint, and within which limits."""
+    import numpy as np
+
+    # An excitation repeats, so one period has its extremes.
+    seconds = min(run.duration_s, motion.period_s or run.duration_s)
+    angles, velocities = motion.at(np.arange(0.0, seconds, 1.0 / sample_rate_hz))[:2]
+    lines = [
+        f"Run {run.name} moves {who} on the rig {rig.name} along {trajectory} for"
+        f" {run.duration_s:g} s:"
+    ]
+    for j, drive in enumerate(rig.drive):
+        angle, speed = angles[:, j], abs(velocities[:, j]).max()
+        low, high = drive.angle_rad
+        lines.append(
+            f"  {drive.joint:<5} {angle.min():+.3f} to {angle.max():+.3f} rad at up to {speed:.3f}"
+            f" rad/s; limits {low:+g} to {high:+g} rad, {drive.speed_rad_s:g} rad/s,"
+            f" {drive.torque_nm:g} N·m"
+        )
+    return lines
+
+
 def ask_before(experiment: "Experiment", step: "Step", *, yes: bool) -> tuple[str, ...]:
     """Ask before a step that moves a real rig in a run that was not named on the command line.
 
     Returns further arguments for its command.
     """
+    from pipelines.mechanics.trajectory import read_trajectory
     from pipelines.settings.rig import load_rig
     from pipelines.settings.rig.recording_only import is_recording_only
 
@@ -78,9 +92,13 @@ def ask_before(experiment: "Experiment", step: "Step", *, yes: bool) -> tuple[st
     if is_recording_only(path):  # nothing moves by it
         return ()
     # Before a person is moved, the command itself asks, and shows the limits.
-    if run.run == "exo_alone" and not load_rig(path).embedded:
+    rig = load_rig(path)
+    if run.run == "exo_alone" and not rig.embedded:
         _require_terminal(f"run {run.name} moves the empty machine")
-        _print(f"Run {run.name} moves the machine for {run.duration_s:g} s.")
+        trajectory, rate_hz = step.inputs[0], experiment.acquire.sample_rate_hz
+        motion = read_trajectory(trajectory)
+        who = "the empty machine"
+        _print("\n".join(_motion_in_words(who, rig, run, trajectory, motion, rate_hz)))
         _ask("Is nobody in the machine, and the emergency stop at hand?", f"run {run.name}")
     return ()
 

@@ -1,4 +1,4 @@
-"""Every command of docs/tutorial.md runs, and prints the output that the page shows.
+"""Every command of docs/tutorial.md and docs/unsure.md runs, and prints the output shown there.
 
 A ``console`` block is a session: ``$ exoid ...`` is run, what follows is what it prints, ``...``
 stands for anything. A ``toml`` block that begins with ``# in FILE`` or ``# at the end of FILE`` is
@@ -13,7 +13,8 @@ from pathlib import Path
 
 import pytest
 
-PAGE = Path(__file__).parents[2] / "docs" / "tutorial.md"
+DOCS = Path(__file__).parents[2] / "docs"
+PAGES = ("tutorial.md", "unsure.md")
 BLOCK = re.compile(r"^```(console|toml)\n(.*?)^```", flags=re.MULTILINE | re.DOTALL)
 NUMBER = re.compile(r"[-+]?\d[\d,]*\.?\d*(?:e[-+]?\d+)?")
 
@@ -61,8 +62,8 @@ class Edit:
         path.write_text(before, encoding="utf-8")
 
 
-def steps() -> Iterator[Command | Edit]:
-    for kind, text in BLOCK.findall(PAGE.read_text(encoding="utf-8")):
+def steps(page: str) -> Iterator[Command | Edit]:
+    for kind, text in BLOCK.findall((DOCS / page).read_text(encoding="utf-8")):
         if kind == "toml":
             head, _, body = text.partition("\n")
             place = re.fullmatch(r"# (in|at the end of) (\S+)", head)
@@ -74,9 +75,9 @@ def steps() -> Iterator[Command | Edit]:
             yield Command(line, printed)
 
 
-def do_all(exoid, monkeypatch, changes) -> Iterator[tuple[Command, str]]:
+def do_all(page, exoid, monkeypatch, changes) -> Iterator[tuple[Command, str]]:
     """Do every step in the current folder; yield each command of exoid's with what it printed."""
-    for step in steps():
+    for step in steps(page):
         if isinstance(step, Edit):
             step.make()
             continue
@@ -107,9 +108,10 @@ GROUPS = ("rig", "settings")
 """Commands that have commands."""
 
 
-def test_the_commands_options_and_settings_of_the_tutorial_exist(exoid, monkeypatch, tmp_path):
+@pytest.mark.parametrize("page", PAGES)
+def test_the_commands_options_and_settings_of_a_page_exist(page, exoid, monkeypatch, tmp_path):
     monkeypatch.chdir(tmp_path)
-    for step in steps():
+    for step in steps(page):
         if isinstance(step, Edit):
             step.make()
             continue
@@ -128,15 +130,16 @@ def test_the_commands_options_and_settings_of_the_tutorial_exist(exoid, monkeypa
 @pytest.mark.slow
 def test_every_command_of_the_tutorial_runs(exoid, monkeypatch, tmp_path):
     monkeypatch.chdir(tmp_path)
-    done = dict(do_all(exoid, monkeypatch, SHORT))
+    done = dict(do_all("tutorial.md", exoid, monkeypatch, SHORT))
     (diagnosed,) = [out for step, out in done.items() if step.line == "exoid diagnose"]
     assert "parallel_spring at the knee" in diagnosed
 
 
 @pytest.mark.slow
-def test_the_tutorial_prints_the_output_that_it_shows(exoid, monkeypatch, tmp_path):
+@pytest.mark.parametrize("page", PAGES)
+def test_a_page_shows_the_output_of_its_commands(page, exoid, monkeypatch, tmp_path):
     monkeypatch.chdir(tmp_path)
-    for step, out in do_all(exoid, monkeypatch, {}):
+    for step, out in do_all(page, exoid, monkeypatch, {}):
         assert alike(step.printed, out), f"{step.line} printed\n{out}"
 
 

@@ -65,12 +65,12 @@ def comments_between(path: Path, mark: str | None, encoding: str, first: int) ->
     first : int
         Line of the first row, counted from 0.
     """
-    # Comments that are told apart; more are a column of their own.
+    # Comments with different words; more are a column of their own.
     most = 3
     # In UTF-16 a byte of a character may be a line's end.
     if mark is None or encoding.startswith("utf-16"):
         return ()
-    found: dict[str, str] = {}
+    remarks: dict[str, str] = {}
     with open(path, "rb") as file, mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as text:
         counted_to, line, rows = 0, 0, _place_of(text, first)
         comment = re.compile(re.escape(mark.encode()) + rb"([^\r\n]*)")
@@ -83,15 +83,15 @@ def comments_between(path: Path, mark: str | None, encoding: str, first: int) ->
                 continue
             words = match[1].decode(encoding, errors="replace").strip()
             # A header that comes again says nothing new, and a rule of signs nothing at all.
-            if match[1] in above or not re.search(r"[^\W\d_]", words) or words in found:
+            if match[1] in above or not re.search(r"[^\W\d_]", words) or words in remarks:
                 continue
             place = match.start()
             line += text[counted_to:place].count(b"\n")
             counted_to = place
-            found[words] = f"in line {line + 1}: {words[:80]!r}"
-            if len(found) == most:
+            remarks[words] = f"in line {line + 1}: {words[:80]!r}"
+            if len(remarks) == most:
                 break
-    return tuple(found.values())
+    return tuple(remarks.values())
 
 
 def _place_of(text: mmap.mmap, line: int) -> int:
