@@ -6,7 +6,8 @@ from dataclasses import dataclass
 from pipelines.design.search import Report
 from pipelines.errors import NotIdentifiable
 from pipelines.investigation.doubt import DECIDED
-from pipelines.investigation.rivals import Rival
+from pipelines.investigation.rivals import Rival, effects_of
+from pipelines.investigation.sensors import sensors_for
 from pipelines.investigation.separating_design import SeparatingDesign, separating_design
 from pipelines.investigation.separation_problem import SeparationProblem
 from pipelines.mechanics.geometry import Geometry
@@ -18,7 +19,7 @@ class NextExperiment:
     """An experiment, and what it is expected to do."""
 
     what: str
-    """``motion``, ``repeat``, ``run`` or ``test``."""
+    """``motion``, ``repeat``, ``run``, ``test`` or ``sensor``."""
     words: str
     decides: float
     """Probability that the true cause has at least ``DECIDED`` afterwards."""
@@ -54,6 +55,7 @@ def next_experiments(
         Called with the share that is done, 0 to 1, and a note.
     """
     rivals = [sized.rival for sized in problem.rivals]
+    machine = next(one.on for one in effects_of(rivals))
     again = problem.with_motion(last)
     experiments = [NextExperiment("repeat", "record the same motion again", again.decides())]
     design: SeparatingDesign | None = None
@@ -70,16 +72,27 @@ def next_experiments(
         experiments.append(NextExperiment("run", f"record {kind} runs, too", other.decides()))
     for rival in rivals:
         if rival.effect:
-            decides = _decides_by_hand(rival, rivals)
+            is_there = [one is rival for one in rivals]
+            apart = [[a != b for b in is_there] for a in is_there]
+            decides = _decides_by(apart, rivals)
             experiments.append(NextExperiment("test", rival.effect.confirm, decides))
+    for sensor in sensors_for(machine):
+        effects = [rival.effect for rival in rivals]
+        apart = [[sensor.separates(one, other) for other in effects] for one in effects]
+        # One that separates no two of them is no news.
+        if any(map(any, apart)):
+            decides = _decides_by(apart, rivals)
+            experiments.append(NextExperiment("sensor", sensor.words, decides))
     # Of equal ones the first is the least work.
     ordered = sorted(experiments, key=lambda one: -round(one.decides, 2))
     return NextExperiments(tuple(rivals), tuple(ordered), design)
 
 
-def _decides_by_hand(rival: Rival, rivals: Sequence[Rival]) -> float:
-    """Return the probability that a test which shows whether one cause is there decides."""
-    others = [one.probability for one in rivals if one is not rival]
-    without = sum(others)
-    leaves_one = without > 0.0 and max(others) >= DECIDED * without
-    return rival.probability + (without if leaves_one else 0.0)
+def _decides_by(apart: Sequence[Sequence[bool]], rivals: Sequence[Rival]) -> float:
+    """Return the probability that an experiment decides, which separates pairs without error."""
+    decides = 0.0
+    for rival, separated in zip(rivals, apart, strict=True):
+        left = [one for one, gone in zip(rivals, separated, strict=True) if not gone]
+        if rival.probability >= DECIDED * sum(one.probability for one in left):
+            decides += rival.probability
+    return decides
