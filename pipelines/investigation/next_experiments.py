@@ -88,11 +88,11 @@ def next_experiments(
     return NextExperiments(tuple(rivals), tuple(ordered), design)
 
 
-def _decides_by(apart: Sequence[Sequence[bool]], rivals: Sequence[Rival]) -> float:
+def _decides_by(separates: Sequence[Sequence[bool]], rivals: Sequence[Rival]) -> float:
     """Return the probability that an experiment decides, which separates pairs without error."""
     decides = 0.0
-    for rival, separated in zip(rivals, apart, strict=True):
-        left = [one for one, gone in zip(rivals, separated, strict=True) if not gone]
-        if rival.probability >= DECIDED * sum(one.probability for one in left):
+    for rival, separated in zip(rivals, separates, strict=True):
+        alike = [one for one, apart in zip(rivals, separated, strict=True) if not apart]
+        if rival.probability >= DECIDED * sum(one.probability for one in alike):
             decides += rival.probability
     return decides
