@@ -20,7 +20,7 @@ SESSIONS ?= 2000
 
 .DEFAULT_GOAL := help
 .PHONY: help all investigate test test-slow invariants mutation readability check format bench estimators real fuzz vetoes blind blind-full blind-machines blind-fixed blind-page
-.PHONY: detectability separation evidence learn cross-validation sensitivity docs lock clean install
+.PHONY: detectability separation investigation evidence learn cross-validation sensitivity docs lock clean install
 
 help: ## this list
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*##/\t/' | sort | expand -t 12
@@ -93,6 +93,9 @@ detectability: $(INSTALLED) ## does a diagnosis name causes of the sizes that `e
 
 separation: $(INSTALLED) ## do excitations of `exoid design --separate` decide as predicted? Twelve pairs of causes, half an hour
 	$(BIN)/python -m tests.campaigns.separation
+
+investigation: $(INSTALLED) ## does a further motion end the doubt of a verdict, in every world? Goes on where it was stopped; hours
+	$(BIN)/python -m tests.campaigns.investigation
 
 vetoes: $(INSTALLED) ## count false vetoes and named faults on simulated and real sessions, and write docs/vetoes.md; goes on where it was stopped
 	$(BIN)/python -m tests.campaigns.vetoes docs/vetoes.md
