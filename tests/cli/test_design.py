@@ -201,7 +201,7 @@ def test_next_says_that_it_writes_no_motion_where_none_separates_the_causes(
 
 def test_no_excitation_is_searched_to_judge_one_for_sizes(monkeypatch):
     judged = []
-    monkeypatch.setattr("exoid_cli.design.last_excitation", None)
+    monkeypatch.setattr("exoid_cli.design.excitations", None)
     monkeypatch.setattr("exoid_cli.design.evaluate_sizes", lambda *given: judged.append(given[0]))
     assert run(["design", "--sizes", "cogging@knee=1", "--evaluate", PUBLISHED]) == 0
     assert [str(file) for file in judged] == [PUBLISHED]
