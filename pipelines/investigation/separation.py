@@ -97,7 +97,7 @@ class Separation:
                 tuple(Appearance.of(shape, weighted) for shape in sized.shapes) or (no_span,)
                 for sized in rivals
             ),
-            0.5 * float(np.log(problem.independent)),
+            0.5 * float(np.log(max(problem.independent, 1.0))),
             is_planned * root,
             own,
             earlier,
@@ -280,8 +280,10 @@ class Separation:
 
 def _weights(truths: Sequence[NDArray], problem: DetectionProblem) -> NDArray:
     """Return the weight of each output, (O,), by the mean power of all truths there."""
-    # The mean over all causes: the rivals stand for one torque.
-    squares = np.mean([np.mean(one * one, axis=0) for one in truths if one.any()], axis=0)
+    # The mean over all causes, not over nothing: the rivals stand for one torque.
+    causes = [one for one in truths if one.any()]
+    squares = sum(np.mean(one * one, axis=0) for one in causes) / max(len(causes), 1)
+    squares = np.broadcast_to(squares, len(problem.outputs))
     explained = np.bincount(problem.outputs, squares, minlength=len(problem.root))
     return power(explained, 1.0, CRITERIA.model_error)
 

@@ -75,8 +75,9 @@ class Appearance:
             parts = [own.expand(c, r) for r, c in enumerate(parts)]
         columns = problem.remainder(parts)
         span = orthonormal(columns)
-        sizes = np.linalg.svd(span.T @ columns, compute_uv=False)[: span.shape[1]]
-        return cls(span, float(np.log(sizes).sum()))
+        sizes = np.linalg.svd(span.T @ columns, compute_uv=False)
+        # An amplitude that does not show is not known at all, and has no size.
+        return cls(span, float(np.log(sizes[sizes > 0.0]).sum()))
 
 
 def in_runs_of(candidate: Candidate, problem: DetectionProblem) -> Candidate:

@@ -111,6 +111,15 @@ def test_the_log_loss_is_that_of_simulated_experiments(usual):
         assert found.log_loss() == pytest.approx(simulated, abs=0.05 + 0.2 * simulated), share
 
 
+def test_a_motion_that_shows_no_rival_decides_nothing(usual):
+    # Both stops are beyond what this motion reaches.
+    still = replace(usual, a=0.02 * usual.a, b=0.02 * usual.b)
+    found = question(usual, "end_stop@hip", "end_stop@knee").with_motion(still)
+    assert found.log_loss() == pytest.approx(np.log(2.0), rel=0.1)
+    assert found.decides() == 0.0
+    assert not found.separable().any()
+
+
 @pytest.mark.parametrize(
     "pair",
     [("torque_gain@hip", "torque_gain@knee"), ("coulomb_asymmetry@knee", "torque_offset@knee")],
