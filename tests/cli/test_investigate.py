@@ -116,6 +116,17 @@ def test_where_no_motion_can_decide_it_says_what_can(exoid, folder, monkeypatch)
     assert "switch the drive off" in done.out
 
 
+def test_where_acquisition_is_at_fault_no_motion_can_help(exoid, folder, monkeypatch):
+    def bring_up_to_date(context, experiment, wanted, before):
+        write_verdict(experiment.out, acquisition_at_fault=True, posterior=None, findings=[])
+
+    monkeypatch.setattr(investigate, "bring_up_to_date", bring_up_to_date)
+    done = exoid("investigate", "--json")
+    assert done.code == 0, done.err
+    document = json.loads(done.out)
+    assert (document["state"], document["stopped_by"]) == ("at_fault", "no motion can help")
+
+
 def test_recordings_of_other_tools_are_refused(exoid, folder):
     write_recording(folder, imported={"map": "map.toml"})
     done = exoid("investigate")
