@@ -142,3 +142,10 @@ def test_a_rig_that_only_records_is_refused(exoid, folder):
     done = exoid("investigate")
     assert done.code == 2
     assert "is recording_only" in done.err
+
+
+def test_a_run_of_a_step_that_has_no_motion_is_not_called_imported(exoid, folder):
+    done = exoid("acquire", "--run", "exo_alone_train+9")
+    assert done.code == 2
+    assert "run exo_alone_train+9: there is no motion for it" in done.err
+    assert "imported" not in done.err

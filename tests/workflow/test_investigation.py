@@ -56,7 +56,7 @@ def test_a_step_without_a_motion_and_those_after_it_do_not_count(folder):
 def test_a_run_of_a_step_is_found_by_its_name_alone(folder):
     experiment = Experiment.load(folder / "exoid.toml")
     assert experiment.run_named("exo_alone_train+2") == load(folder).run[8]
-    for name in ("exo_alone_train+", "exo_alone_train+x", "nobody+1"):
+    for name in ("exo_alone_train+", "exo_alone_train+x", "exo_alone_train+0", "nobody+1"):
         with pytest.raises(SettingsError, match="has no"):
             experiment.run_named(name)
 
