@@ -97,7 +97,8 @@ class Separation:
                 tuple(Appearance.of(shape, weighted) for shape in sized.shapes) or (no_span,)
                 for sized in rivals
             ),
-            0.5 * float(np.log(problem.independent)),
+            # Runs without a usable row, as of a machine at rest, cost nothing and show nothing.
+            0.5 * float(np.log(max(problem.independent, 1.0))),
             is_planned * root,
             own,
             earlier,
@@ -281,7 +282,8 @@ class Separation:
 def _weights(truths: Sequence[NDArray], problem: DetectionProblem) -> NDArray:
     """Return the weight of each output, (O,), by the mean power of all truths there."""
     # The mean over all causes: the rivals stand for one torque.
-    squares = np.mean([np.mean(one * one, axis=0) for one in truths if one.any()], axis=0)
+    powers = [np.mean(one * one, axis=0) for one in truths if one.any()]
+    squares = np.mean(powers or [np.zeros(len(problem.outputs))], axis=0)
     explained = np.bincount(problem.outputs, squares, minlength=len(problem.root))
     return power(explained, 1.0, CRITERIA.model_error)
 
