@@ -1,6 +1,7 @@
 """`exoid investigate`: what it records and when it stops, without a rig and a diagnosis."""
 
 import json
+import shutil
 
 import pytest
 
@@ -27,6 +28,18 @@ def folder(tmp_path, monkeypatch):
     return tmp_path
 
 
+def write_fitted(out, **decision):
+    """Write a verdict that names cogging, with its values."""
+    write_verdict(out, **decision_of(**decision))
+    file = out / "diagnosed" / "verdict.json"
+    document = json.loads(file.read_text())
+    document["causes"][0]["parameters"] = [
+        {"name": name, "value": value, "unit": unit, "ci95": [None, None]}
+        for name, value, unit in COGGING
+    ]
+    file.write_text(json.dumps(document))
+
+
 @pytest.fixture
 def diagnosed(folder, monkeypatch):
     """Let each diagnosis have the next of some verdicts; returns the recordings of each."""
@@ -37,14 +50,7 @@ def diagnosed(folder, monkeypatch):
 
         def bring_up_to_date(context, experiment, wanted, before):
             recorded.append([step.run for step in wanted if step.stage == "acquire"])
-            write_verdict(experiment.out, **decision_of(**next(coming)))
-            file = experiment.out / "diagnosed" / "verdict.json"
-            document = json.loads(file.read_text())
-            document["causes"][0]["parameters"] = [
-                {"name": name, "value": value, "unit": unit, "ci95": [None, None]}
-                for name, value, unit in COGGING
-            ]
-            file.write_text(json.dumps(document))
+            write_fitted(experiment.out, **next(coming))
 
         monkeypatch.setattr(investigate, "bring_up_to_date", bring_up_to_date)
         return recorded
@@ -149,3 +155,14 @@ def test_a_run_of_a_step_that_has_no_motion_is_not_called_imported(exoid, folder
     assert done.code == 2
     assert "run exo_alone_train+9: there is no motion for it" in done.err
     assert "imported" not in done.err
+
+
+def test_a_motion_that_was_not_recorded_yet_has_shown_nothing(exoid, folder):
+    assert exoid("design").code == 0
+    write_fitted(folder, **EASY)
+    judge = ("design", "--from", "diagnosed", "--evaluate", "trajectory.parquet", "--json")
+    before = json.loads(exoid(*judge).out)
+    step = folder / "investigation" / "1"
+    step.mkdir(parents=True)
+    shutil.copyfile(folder / "trajectory.parquet", step / "trajectory.parquet")
+    assert json.loads(exoid(*judge).out) == before
