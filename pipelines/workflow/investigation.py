@@ -28,6 +28,11 @@ def verdict_before(out: Path, step: int) -> Path:
     return step_folder(out, step) / "verdict.json"
 
 
+def verdicts_before_steps(out: Path) -> list[Path]:
+    """Return the verdicts from which the steps' motions were designed, in the steps' order."""
+    return [verdict_before(out, step) for step in range(1, last_step(out) + 1)]
+
+
 def last_step(out: Path) -> int:
     """Return the number of steps that have a motion."""
     return sum(1 for _ in takewhile(lambda step: motion_of(out, step).is_file(), count(1)))
