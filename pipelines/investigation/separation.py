@@ -115,20 +115,13 @@ class Separation:
         The mean over the truth's shapes; of the rival, the shape counts that is most alike.
         Diagnosed runs only add to what the others show.
         """
-        return self._odds(priced=True)
-
-    def distances(self) -> NDArray:
-        """Return what T-optimality maximizes, (R, R): the log odds where amplitudes cost nothing.
-
-        A motion that shows nothing of causes which hardly show may improve their log odds.
-        """
-        return self._odds(priced=False)
-
-    def _odds(self, priced: bool) -> NDArray:
-        return np.array([one.mean(axis=0) for one in self._odds_of_truths(priced)])
+        return np.array([one.mean(axis=0) for one in self._odds_of_truths(priced=True)])
 
     def _odds_of_truths(self, priced: bool) -> list[NDArray]:
-        """Return the expected log odds of each size of each truth, (n, R)."""
+        """Return the expected log odds of each size of each truth, (n, R).
+
+        Unless ``priced``, amplitudes cost nothing: what T-optimality maximizes.
+        """
         result = []
         for i, truths in enumerate(self.truths):
             lost = np.array(
