@@ -13,7 +13,11 @@ if TYPE_CHECKING:
 
 
 def excitations(
-    config: Path | None, settings: Any, geometry: Any, results: Path | None = None
+    config: Path | None,
+    settings: Any,
+    geometry: Any,
+    results: Path | None = None,
+    last: int | None = None,
 ) -> "tuple[str, list[Trajectory]]":
     """Return the excitations that were followed, or else are to be followed, and the last's name.
 
@@ -27,15 +31,16 @@ def excitations(
         Lengths and gravity.
     results : Path, optional
         Folder of the experiment's results, if it is not that of exoid.toml.
+    last : int, optional
+        The last step of an investigation that counts; by default all.
     """
     from pipelines.design.excitation import design
     from pipelines.mechanics.trajectory import read_trajectory
     from pipelines.workflow.investigation import motions_of
 
     if config is not None or in_experiment_folder():
-        files = [
-            file for file in motions_of(results or open_experiment(config).out) if file.is_file()
-        ]
+        motions = motions_of(results or open_experiment(config).out, last)
+        files = [file for file in motions if file.is_file()]
         if files:
             return str(files[-1]), [read_trajectory(file) for file in files]
     return f"the excitation of {settings.criterion}", [design(settings, geometry).trajectory]

@@ -32,6 +32,11 @@ class ExperimentFolder:
         for step in self.of_stage(stage):
             if step.run == run:
                 return step
+        if run and run not in self.imported.names:
+            raise InputError(
+                f"run {run}: there is no motion for it in {self.out / 'investigation'}; `exoid"
+                " investigate` adds steps, each with a motion"
+            )
         raise InputError(
             f"{self.out / NAME}: {why_no_step(stage, run)}; name the files to read and, with -o,"
             " what to write"

@@ -84,8 +84,10 @@ def _why_to_stop(folder: ExperimentFolder, doubt: "Doubt") -> str | None:
     """Return why no further experiment is made; None where one would help and is affordable."""
     from pipelines.investigation.doubt import State
 
+    if doubt.state in (State.NAMED, State.NOTHING):
+        return "nothing is left open"
     if doubt.state is not State.OPEN:
-        return "no motion can help" if doubt.state is State.UNLISTED else "nothing is left open"
+        return "no motion can help"
     runs = folder.experiment.run
     own = [run for run in runs if not run.step and run.name not in folder.imported.names]
     budget = folder.experiment.investigate

@@ -44,9 +44,11 @@ def question_of(
     from pipelines.mechanics.geometry import Geometry
     from pipelines.mechanics.machine import THE_LEG
     from pipelines.mechanics.read import geometry_from
+    from pipelines.workflow.investigation import step_diagnosed
 
     known = tuple(experiment.diagnose.known)
     runs = PlannedRuns(settings, usual_plant(experiment.mechanism), known=known)
+    last = None
     if folder is None:
         rivals = rivals_named(labels, THE_LEG)
     else:
@@ -55,6 +57,8 @@ def question_of(
         # First whether it is of the leg: the labels of another machine would be refused for typos.
         runs = runs.as_in_verdict(verdict, file)
         rivals = rivals_in_verdict(verdict, file, THE_LEG)
+        # A motion that was not recorded yet has shown nothing.
+        last = step_diagnosed(verdict)
     for rival in rivals:
         if rival.label in known:
             raise InputError(
@@ -64,7 +68,7 @@ def question_of(
     # The diagnosed recordings lie where the experiment's other results are.
     results = folder.resolve().parent if folder else None
     geometry = geometry_from(experiment) or Geometry()
-    name, motions = excitations(config, settings, geometry, results)
+    name, motions = excitations(config, settings, geometry, results, last)
     if folder is not None:
         runs = runs.after(motions)
     return Question(SeparationProblem.of(rivals, runs, motions[-1]), motions[-1], name)

@@ -1,6 +1,6 @@
 """Which experiment would end the doubt of a verdict, and how probably."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 from pipelines.design.search import Report
@@ -11,6 +11,7 @@ from pipelines.investigation.sensors import sensors_for
 from pipelines.investigation.separating_design import SeparatingDesign, separating_design
 from pipelines.investigation.separation_problem import SeparationProblem
 from pipelines.mechanics.geometry import Geometry
+from pipelines.mechanics.machine import Machine
 from pipelines.mechanics.trajectory import Trajectory
 
 
@@ -22,7 +23,7 @@ class NextExperiment:
     """``motion``, ``repeat``, ``run``, ``test`` or ``sensor``."""
     words: str
     decides: float
-    """Probability that the true cause has at least ``DECIDED`` afterwards."""
+    """Probability that the true rival has at least ``DECIDED`` afterwards."""
 
 
 @dataclass(frozen=True)
@@ -67,25 +68,31 @@ def next_experiments(
     except NotIdentifiable:
         words = "no motion within [design.bounds] separates them"
     experiments.append(NextExperiment("motion", words, decides))
-    for kind in {"exo_alone", "with_human"} - set(problem.runs.kinds):
+    for kind in sorted({"exo_alone", "with_human"} - set(problem.runs.kinds)):
         other = problem.with_motion(last, (kind,))
         experiments.append(NextExperiment("run", f"record {kind} runs, too", other.decides()))
+    experiments += [*_tests(rivals), *_sensors(rivals, machine)]
+    # Of equal ones the first is the least work.
+    ordered = sorted(experiments, key=lambda one: -round(one.decides, 2))
+    return NextExperiments(tuple(rivals), tuple(ordered), design)
+
+
+def _tests(rivals: Sequence[Rival]) -> Iterator[NextExperiment]:
+    """Yield the test by hand of each cause, which shows whether it is there."""
     for rival in rivals:
         if rival.effect:
             is_there = [one is rival for one in rivals]
             apart = [[a != b for b in is_there] for a in is_there]
-            decides = _decides_by(apart, rivals)
-            experiments.append(NextExperiment("test", rival.effect.confirm, decides))
+            yield NextExperiment("test", rival.effect.confirm, _decides_by(apart, rivals))
+
+
+def _sensors(rivals: Sequence[Rival], machine: Machine) -> Iterator[NextExperiment]:
+    """Yield the sensors that separate two rivals or more."""
+    effects = [rival.effect for rival in rivals]
     for sensor in sensors_for(machine):
-        effects = [rival.effect for rival in rivals]
         apart = [[sensor.separates(one, other) for other in effects] for one in effects]
-        # One that separates no two of them is no news.
         if any(map(any, apart)):
-            decides = _decides_by(apart, rivals)
-            experiments.append(NextExperiment("sensor", sensor.words, decides))
-    # Of equal ones the first is the least work.
-    ordered = sorted(experiments, key=lambda one: -round(one.decides, 2))
-    return NextExperiments(tuple(rivals), tuple(ordered), design)
+            yield NextExperiment("sensor", sensor.words, _decides_by(apart, rivals))
 
 
 def _decides_by(separates: Sequence[Sequence[bool]], rivals: Sequence[Rival]) -> float:

@@ -96,6 +96,6 @@ def separating_design(
             )
 
     settings = problem.runs.settings
-    design = polished_search(settings, geometry, cost, report, refuse_inseparable, last, 3e-3)
+    design = polished_search(settings, geometry, cost, report, refuse_inseparable, last)
     separated, before = problem.with_motion(design.trajectory), problem.with_motion(last)
     return SeparatingDesign(design, separated, before, tuple(inseparable))

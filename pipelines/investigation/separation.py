@@ -97,6 +97,7 @@ class Separation:
                 tuple(Appearance.of(shape, weighted) for shape in sized.shapes) or (no_span,)
                 for sized in rivals
             ),
+            # Runs without a usable row, as of a machine at rest, cost nothing and show nothing.
             0.5 * float(np.log(max(problem.independent, 1.0))),
             is_planned * root,
             own,
@@ -114,20 +115,13 @@ class Separation:
         The mean over the truth's shapes; of the rival, the shape counts that is most alike.
         Diagnosed runs only add to what the others show.
         """
-        return self._odds(priced=True)
-
-    def distances(self) -> NDArray:
-        """Return what T-optimality maximizes, (R, R): the log odds where amplitudes cost nothing.
-
-        A motion that shows nothing of causes which hardly show may improve their log odds.
-        """
-        return self._odds(priced=False)
-
-    def _odds(self, priced: bool) -> NDArray:
-        return np.array([one.mean(axis=0) for one in self._odds_of_truths(priced)])
+        return np.array([one.mean(axis=0) for one in self._odds_of_truths(priced=True)])
 
     def _odds_of_truths(self, priced: bool) -> list[NDArray]:
-        """Return the expected log odds of each size of each truth, (n, R)."""
+        """Return the expected log odds of each size of each truth, (n, R).
+
+        Unless ``priced``, amplitudes cost nothing: what T-optimality maximizes.
+        """
         result = []
         for i, truths in enumerate(self.truths):
             lost = np.array(
@@ -280,10 +274,9 @@ class Separation:
 
 def _weights(truths: Sequence[NDArray], problem: DetectionProblem) -> NDArray:
     """Return the weight of each output, (O,), by the mean power of all truths there."""
-    # The mean over all causes, not over nothing: the rivals stand for one torque.
-    causes = [one for one in truths if one.any()]
-    squares = sum(np.mean(one * one, axis=0) for one in causes) / max(len(causes), 1)
-    squares = np.broadcast_to(squares, len(problem.outputs))
+    # The mean over all causes: the rivals stand for one torque.
+    powers = [np.mean(one * one, axis=0) for one in truths if one.any()]
+    squares = np.mean(powers or [np.zeros(len(problem.outputs))], axis=0)
     explained = np.bincount(problem.outputs, squares, minlength=len(problem.root))
     return power(explained, 1.0, CRITERIA.model_error)
 

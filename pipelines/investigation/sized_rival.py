@@ -37,7 +37,7 @@ class Truth:
 
         Without what the baseline explains, in units of the noise.
         """
-        candidate = in_runs_of(self.candidate, problem)
+        candidate = _in_runs_of(self.candidate, problem)
         if self.linear is None:
             parts = _direction(candidate, problem)
         else:
@@ -68,7 +68,7 @@ class Appearance:
     @classmethod
     def of(cls, candidate: Candidate, problem: DetectionProblem) -> "Appearance":
         """Compute it for a shape in planned or recorded runs."""
-        candidate = in_runs_of(candidate, problem)
+        candidate = _in_runs_of(candidate, problem)
         own = candidate.columns_in([run.motion.run for run in problem.runs])
         parts = _parts(candidate, problem)
         if not candidate.transforms_motion:
@@ -80,7 +80,7 @@ class Appearance:
         return cls(span, float(np.log(sizes[sizes > 0.0]).sum()))
 
 
-def in_runs_of(candidate: Candidate, problem: DetectionProblem) -> Candidate:
+def _in_runs_of(candidate: Candidate, problem: DetectionProblem) -> Candidate:
     """Return a candidate for the runs of a problem; planned runs have equal shapes."""
     return Candidate(candidate.effect, (candidate.shapes[0],) * len(problem.runs))
 

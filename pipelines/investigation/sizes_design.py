@@ -112,7 +112,7 @@ def _search(sizes: SmallestSizes, runs: PlannedRuns, geometry: Geometry, report:
         best = max(best, float(shares.min()))
         return _cost(shares, log_det), f"least wanted size {best:.3g} of the smallest"
 
-    return polished_search(runs.settings, geometry, cost, report, least_gain=3e-3)
+    return polished_search(runs.settings, geometry, cost, report)
 
 
 def _cost(shares: np.ndarray, log_det: float) -> float:

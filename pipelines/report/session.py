@@ -12,6 +12,7 @@ from pipelines.contracts import verdict as verdicts
 from pipelines.contracts.provenance import sha256
 from pipelines.errors import ContractError, InputError
 from pipelines.settings import Experiment
+from pipelines.workflow.investigation import verdicts_before_steps
 
 
 @dataclass(frozen=True)
@@ -151,12 +152,15 @@ class Session:
     def verdict_file(self) -> Artifact | None:
         """The verdict: the only one, or the one in ``diagnosed/``.
 
+        Verdicts that a step of an investigation began with are history.
+
         Raises
         ------
         InputError
             If there are several, and none or several in ``diagnosed/``.
         """
-        files = self.of_kind("verdict")
+        history = {file for folder in self.folders for file in verdicts_before_steps(folder)}
+        files = [one for one in self.of_kind("verdict") if one.path not in history]
         usual = [folder / "diagnosed" for folder in self.folders]
         # Other folders may hold diagnoses that were made by hand; the stage's own one counts.
         files = [one for one in files if one.path.parent in usual] or files

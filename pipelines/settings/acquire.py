@@ -35,5 +35,10 @@ class RunSettings(Settings):
     @property
     def step(self) -> int:
         """The step of an investigation that it belongs to; 0 for a run of exoid.toml."""
-        step = self.name.partition("+")[2]
-        return int(step) if step.isdecimal() else 0
+        return step_of(self.name)
+
+
+def step_of(name: str) -> int:
+    """Return the step of an investigation that a run ``NAME+STEP`` belongs to; 0 for ``NAME``."""
+    step = name.partition("+")[2]
+    return int(step) if step.isdecimal() else 0

@@ -140,7 +140,8 @@ class Experiment(Settings):
         for run in self.run:
             if run.name == name:
                 return run
-            if run.name == base and step.isdecimal():
+            # Step 0 is the run itself.
+            if run.name == base and step.isdecimal() and int(step) > 0:
                 return run.repeated(int(step))
         raise SettingsError(
             f"{self._path}: has no [[run]] named {name};"

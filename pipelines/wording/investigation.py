@@ -6,7 +6,7 @@ from typing import Any
 
 from pipelines.contracts.provenance import metadata_of
 from pipelines.contracts.verdict import Verdict, read
-from pipelines.workflow.investigation import last_step, motion_of, verdict_before
+from pipelines.workflow.investigation import motion_of, verdicts_before_steps
 
 SHOWN_FROM = 0.05
 """Probability from which a cause has a place in the history, in any step."""
@@ -45,9 +45,7 @@ def history(out: Path, diagnosed: Path) -> list[InvestigationStep]:
     ContractError
         Where a verdict is damaged.
     """
-    last = last_step(out)
-    verdicts = [read(verdict_before(out, step)) for step in range(1, last + 1)]
-    verdicts.append(read(diagnosed))
+    verdicts = [read(file) for file in (*verdicts_before_steps(out), diagnosed)]
     every = [_probabilities(one) for one in verdicts]
     shown = {label for one in every for label, p in one.items() if p >= SHOWN_FROM}
     return [

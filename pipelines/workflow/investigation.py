@@ -7,6 +7,8 @@ to end its doubt. Every [[run]] is repeated along the motion, as run ``NAME+K`` 
 from itertools import chain, count, takewhile
 from pathlib import Path
 
+from pipelines.contracts.verdict import Verdict
+from pipelines.settings.acquire import step_of
 from pipelines.settings.experiment import Experiment
 from pipelines.workflow.imported import ImportedRuns
 
@@ -26,16 +28,33 @@ def verdict_before(out: Path, step: int) -> Path:
     return step_folder(out, step) / "verdict.json"
 
 
+def verdicts_before_steps(out: Path) -> list[Path]:
+    """Return the verdicts from which the steps' motions were designed, in the steps' order."""
+    return [verdict_before(out, step) for step in range(1, last_step(out) + 1)]
+
+
 def last_step(out: Path) -> int:
     """Return the number of steps that have a motion."""
     return sum(1 for _ in takewhile(lambda step: motion_of(out, step).is_file(), count(1)))
 
 
-def motions_of(out: Path) -> list[Path]:
-    """Return the motions of an experiment: the designed excitation, and that of each step."""
-    return [out / "trajectory.parquet"] + [
-        motion_of(out, step) for step in range(1, last_step(out) + 1)
-    ]
+def motions_of(out: Path, last: int | None = None) -> list[Path]:
+    """Return the motions of an experiment: the designed excitation, and that of each step.
+
+    Parameters
+    ----------
+    out : Path
+        Folder of the results.
+    last : int, optional
+        The last step that counts; by default all that have a motion.
+    """
+    steps = last_step(out) if last is None else min(last, last_step(out))
+    return [out / "trajectory.parquet"] + [motion_of(out, step) for step in range(1, steps + 1)]
+
+
+def step_diagnosed(verdict: Verdict) -> int:
+    """Return the last step whose recordings a verdict was computed from."""
+    return max((step_of(Path(one.name).stem) for one in verdict.provenance.inputs), default=0)
 
 
 def with_investigation(experiment: Experiment, imported: ImportedRuns, out: Path) -> Experiment:

@@ -52,7 +52,7 @@ def _others(pendulum):
     return [line.replace("\n", ",0\n") for line in _lines(pendulum)]
 
 
-@pytest.mark.parametrize("end", ["\n", "\r\n"])
+@pytest.mark.parametrize("end", ["\n", "\r\n", "\r"])
 def test_a_comment_between_the_rows_is_repeated_with_its_line(imported, pendulum, tmp_path, end):
     rows, header = _lines(pendulum), ["# bench 4\n", "time,angle,velocity,torque\n"]
     said = "# tare torque: 1.85 N·m removed from here on\n"

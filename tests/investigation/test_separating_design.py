@@ -164,6 +164,14 @@ def mean_of(truths, problem):
     return np.mean([one.torque(problem) for one in truths], axis=0)
 
 
+@pytest.mark.filterwarnings("error")
+def test_a_motion_at_rest_leaves_the_probabilities_as_they_are(usual):
+    resting = replace(usual, a=0.0 * usual.a, b=0.0 * usual.b)
+    separated = question(usual, *EASY).with_motion(resting)
+    assert separated.posterior() == pytest.approx(np.full((2, 400, 2), 0.5))
+    assert separated.log_loss() == pytest.approx(np.log(2.0))
+
+
 def test_a_tie_of_a_fitted_cause_makes_its_torque(usual):
     asymmetry, offset = named("coulomb_asymmetry@hip", "torque_offset@hip")
     fitted = Rival(asymmetry.effect, 0.6, Term(asymmetry.effect, np.array([-2.0])))

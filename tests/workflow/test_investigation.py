@@ -2,13 +2,21 @@
 
 import pytest
 
+from pipelines.contracts.verdict import read
 from pipelines.errors import SettingsError
 from pipelines.settings import Experiment
 from pipelines.settings.template import create
 from pipelines.workflow.graph import graph
 from pipelines.workflow.imported import ImportedRuns
-from pipelines.workflow.investigation import last_step, motion_of, motions_of, with_investigation
+from pipelines.workflow.investigation import (
+    last_step,
+    motion_of,
+    motions_of,
+    step_diagnosed,
+    with_investigation,
+)
 from pipelines.workflow.split import split
+from tests.report.sessions import write_verdict
 
 
 @pytest.fixture
@@ -53,10 +61,20 @@ def test_a_step_without_a_motion_and_those_after_it_do_not_count(folder):
     assert motions_of(folder) == [folder / "trajectory.parquet"]
 
 
+def test_a_motion_whose_recordings_were_not_diagnosed_does_not_count(folder):
+    for inputs, last in (([folder / "one+1.parquet"], 1), ([folder / "trajectory.parquet"], 0)):
+        inputs[0].touch()
+        write_verdict(folder, inputs=inputs)
+        verdict = read(folder / "diagnosed" / "verdict.json")
+        assert step_diagnosed(verdict) == last
+        motions = motions_of(folder, step_diagnosed(verdict))
+        assert motions == [folder / "trajectory.parquet", motion_of(folder, 1)][: last + 1]
+
+
 def test_a_run_of_a_step_is_found_by_its_name_alone(folder):
     experiment = Experiment.load(folder / "exoid.toml")
     assert experiment.run_named("exo_alone_train+2") == load(folder).run[8]
-    for name in ("exo_alone_train+", "exo_alone_train+x", "nobody+1"):
+    for name in ("exo_alone_train+", "exo_alone_train+x", "exo_alone_train+0", "nobody+1"):
         with pytest.raises(SettingsError, match="has no"):
             experiment.run_named(name)
 

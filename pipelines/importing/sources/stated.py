@@ -72,7 +72,9 @@ def comments_between(path: Path, mark: str | None, encoding: str, first: int) ->
         return ()
     remarks: dict[str, str] = {}
     with open(path, "rb") as file, mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as text:
-        counted_to, line, rows = 0, 0, _place_of(text, first)
+        # Some files of old end their lines with a carriage return alone.
+        end = b"\n" if text.find(b"\n") >= 0 else b"\r"
+        counted_to, line, rows = 0, 0, _place_of(text, first, end)
         comment = re.compile(re.escape(mark.encode()) + rb"([^\r\n]*)")
         above: set[bytes] = set()
         for match in comment.finditer(text):
@@ -86,7 +88,7 @@ def comments_between(path: Path, mark: str | None, encoding: str, first: int) ->
             if match[1] in above or not re.search(r"[^\W\d_]", words) or words in remarks:
                 continue
             place = match.start()
-            line += text[counted_to:place].count(b"\n")
+            line += text[counted_to:place].count(end)
             counted_to = place
             remarks[words] = f"in line {line + 1}: {words[:80]!r}"
             if len(remarks) == most:
@@ -94,11 +96,11 @@ def comments_between(path: Path, mark: str | None, encoding: str, first: int) ->
     return tuple(remarks.values())
 
 
-def _place_of(text: mmap.mmap, line: int) -> int:
-    """Return the first byte of a line, counted from 0."""
+def _place_of(text: mmap.mmap, line: int, end: bytes) -> int:
+    """Return the first byte of a line, counted from 0, where each has some end."""
     place = 0
     for _ in range(line):
-        place = text.find(b"\n", place) + 1
+        place = text.find(end, place) + 1
     return place
 
 

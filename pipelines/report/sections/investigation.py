@@ -5,22 +5,25 @@ from typing import Any
 from pipelines.report.session import Session
 from pipelines.wording.investigation import history
 from pipelines.wording.label import label_in_words
-from pipelines.workflow.investigation import last_step
+from pipelines.workflow.investigation import last_step, verdicts_before_steps
 
 
 def investigation(session: Session) -> dict[str, Any] | None:
-    """Return the values of the template's card; None where nothing was investigated."""
+    """Return the values of the template's card.
+
+    None where nothing was investigated, or where the verdict of a step is damaged, which the page
+    names elsewhere.
+    """
     out = next((folder for folder in session.folders if last_step(folder)), None)
     if out is None or session.verdict_file is None:
+        return None
+    if not session.unreadable.keys().isdisjoint(verdicts_before_steps(out)):
         return None
     steps = history(out, session.verdict_file.path)
     labels = dict.fromkeys(label for one in steps for label in one.probabilities)
     nothing = {"nothing": "nothing is missing"}
     return {
-        "steps": [
-            {"step": one.step, "runs": one.runs, "decides": one.decides, "file": _motion(one.step)}
-            for one in steps
-        ],
+        "steps": [{"step": one.step, "runs": one.runs, "decides": one.decides} for one in steps],
         "rows": [
             {
                 "words": nothing.get(label) or label_in_words(label),
@@ -29,7 +32,3 @@ def investigation(session: Session) -> dict[str, Any] | None:
             for label in labels
         ],
     }
-
-
-def _motion(step: int) -> str:
-    return f"investigation/{step}/trajectory.parquet" if step else "trajectory.parquet"
