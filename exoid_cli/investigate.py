@@ -37,11 +37,12 @@ def investigate(
       exoid investigate --config my_experiment/exoid.toml --yes
     """
     from pipelines.workflow.graph import needed_for
-    from pipelines.workflow.investigation import last_step
+    from pipelines.workflow.investigation import last_step, refuse_lost_verdicts
     from pipelines.workflow.split import split
 
     folder = open_experiment(config, out)
     _refuse_without_rig(folder)
+    refuse_lost_verdicts(folder.out)
     while True:
         # First, so that make, called next, finds every result newer than its settings.
         split(folder.experiment, folder.out / ".settings")

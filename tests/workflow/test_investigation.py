@@ -2,12 +2,19 @@
 
 import pytest
 
-from pipelines.errors import SettingsError
+from pipelines.errors import InputError, SettingsError
 from pipelines.settings import Experiment
 from pipelines.settings.template import create
 from pipelines.workflow.graph import graph
 from pipelines.workflow.imported import ImportedRuns
-from pipelines.workflow.investigation import last_step, motion_of, motions_of, with_investigation
+from pipelines.workflow.investigation import (
+    last_step,
+    motion_of,
+    motions_of,
+    refuse_lost_motion,
+    refuse_lost_verdicts,
+    with_investigation,
+)
 from pipelines.workflow.split import split
 
 
@@ -75,3 +82,34 @@ def test_make_has_the_same_rules(folder):
     split(Experiment.load(folder / "exoid.toml"), folder / ".settings")
     rules = (folder / ".settings" / "graph.mk").read_text()
     assert "$(OUT)/recordings/exo_alone_train+1.parquet: $(OUT)/investigation/1/" in rules
+
+
+def test_a_recording_whose_motion_is_missing_is_not_left_out_of_results(folder):
+    recording = folder / "recordings" / "exo_alone_train+2.parquet"
+    recording.parent.mkdir()
+    recording.touch()
+    refuse_lost_motion(load(folder), folder)
+    motion_of(folder, 2).unlink()
+    with pytest.raises(InputError, match=r"2.trajectory.parquet: no such file.*train\+2.parquet"):
+        refuse_lost_motion(load(folder), folder)
+    with pytest.raises(InputError, match="no such file"):
+        split(Experiment.load(folder / "exoid.toml"), folder / ".settings")
+    # A run that exoid.toml no longer has is left out on purpose.
+    recording.rename(recording.with_name("former+2.parquet"))
+    refuse_lost_motion(load(folder), folder)
+
+
+def test_a_step_whose_motion_is_missing_is_not_designed_again_before_a_later_one(folder):
+    motion_of(folder, 1).unlink()
+    with pytest.raises(InputError, match=r"1.trajectory.parquet: no such file.*2.trajectory"):
+        refuse_lost_motion(load(folder), folder)
+
+
+@pytest.mark.parametrize("content", [None, '{"status": "o'])
+def test_a_step_without_a_whole_verdict_is_refused(folder, content):
+    if content:
+        (folder / "investigation" / "1" / "verdict.json").write_text(content)
+    with pytest.raises(
+        InputError, match=r"1.verdict.json: is missing or damaged; .* before step 1"
+    ):
+        refuse_lost_verdicts(folder)
