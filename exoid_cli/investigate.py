@@ -46,6 +46,7 @@ def investigate(
     while True:
         # First, so that make, called next, finds every result newer than its settings.
         split(folder.experiment, folder.out / ".settings")
+        _refuse_to_record_again(folder)
         wanted = needed_for([folder.step("diagnose")], folder.steps)
         bring_up_to_date(
             context, folder, wanted, before=partial(ask_before, folder.experiment, yes=yes)
@@ -72,6 +73,26 @@ def _refuse_without_rig(folder: ExperimentFolder) -> None:
     rig = folder.experiment.file(folder.experiment.acquire.rig)
     if is_recording_only(rig):
         raise InputError(f"{rig}: is recording_only, so exoid moves nothing by it; {instead}")
+
+
+def _refuse_to_record_again(folder: ExperimentFolder) -> None:
+    """Refuse where a real rig's recording is stale, before the motion it followed is replaced."""
+    from pipelines.workflow.freshness import Freshness, Judge
+    from pipelines.workflow.imported import real_rig_of
+
+    changed: tuple[str, ...] = ()
+    for judged in Judge(folder.out).all(folder.steps):
+        if judged.step.stage == "design" and not judged.done:
+            changed = judged.why or (f"{judged.step.target} is missing",)
+        if judged.step.stage != "acquire" or judged.state is not Freshness.STALE:
+            continue
+        rig = real_rig_of(judged.step.target)
+        if rig is not None:
+            reason = (changed or judged.why)[0]
+            raise InputError(
+                f"{judged.step.target}: is a recording of the rig {rig}, and nothing records it"
+                f" again ({reason}); undo that change, or begin anew with --out DIR"
+            )
 
 
 def _doubt(folder: ExperimentFolder) -> "Doubt":

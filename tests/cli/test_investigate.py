@@ -116,6 +116,25 @@ def test_where_no_motion_can_decide_it_says_what_can(exoid, folder, monkeypatch)
     assert "switch the drive off" in done.out
 
 
+def test_a_real_rig_s_recordings_keep_the_motion_that_they_followed(exoid, folder, diagnosed):
+    recorded = diagnosed(EASY)
+    for name in ("exo_alone_train", "with_human_validate"):
+        rig = {"name": "lab", "embedded": False}
+        write_recording(
+            folder, name=f"{name}.parquet", config={"rig": rig, "acquire": {"sample_rate_hz": 9.0}}
+        )
+    assert exoid("design").code == 0
+    before = (folder / "trajectory.parquet").read_bytes()
+    with (folder / "exoid.toml").open("a") as file:
+        file.write("[design.noise]\nhip_nm = 0.5\n")
+    done = exoid("investigate", "--yes")
+    assert done.code == 2
+    assert "exo_alone_train.parquet: is a recording of the rig lab" in done.err
+    assert "design.noise.hip_nm was 0.6, is 0.5" in done.err
+    assert not recorded
+    assert (folder / "trajectory.parquet").read_bytes() == before
+
+
 def test_recordings_of_other_tools_are_refused(exoid, folder):
     write_recording(folder, imported={"map": "map.toml"})
     done = exoid("investigate")
