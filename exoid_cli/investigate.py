@@ -107,7 +107,8 @@ def _why_to_stop(folder: ExperimentFolder, doubt: "Doubt") -> str | None:
     from pipelines.investigation.doubt import State
 
     if doubt.state is not State.OPEN:
-        return "no motion can help" if doubt.state is State.UNLISTED else "nothing is left open"
+        settled = doubt.state in (State.NOTHING, State.NAMED)
+        return "nothing is left open" if settled else "no motion can help"
     runs = folder.experiment.run
     own = [run for run in runs if not run.step and run.name not in folder.imported.names]
     budget = folder.experiment.investigate

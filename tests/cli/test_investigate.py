@@ -82,6 +82,20 @@ def test_an_open_verdict_leads_to_a_motion_and_all_runs_along_it(exoid, folder, 
     assert not (folder / "investigation" / "2").exists()
 
 
+def test_where_acquisition_is_at_fault_no_motion_can_help(exoid, folder, monkeypatch):
+    def bring_up_to_date(context, experiment, wanted, before):
+        write_verdict(experiment.out, **decision_of(**EASY))
+        file = experiment.out / "diagnosed" / "verdict.json"
+        at_fault = {"acquisition_at_fault": True, "findings": [], "posterior": None}
+        file.write_text(json.dumps(json.loads(file.read_text()) | at_fault))
+
+    monkeypatch.setattr(investigate, "bring_up_to_date", bring_up_to_date)
+    done = exoid("investigate", "--json")
+    assert done.code == 0, done.err
+    document = json.loads(done.out)
+    assert (document["state"], document["stopped_by"]) == ("at_fault", "no motion can help")
+
+
 @pytest.mark.parametrize(
     ("budget", "why"),
     [
