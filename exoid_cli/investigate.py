@@ -143,6 +143,11 @@ def _add_step(folder: ExperimentFolder, step: int) -> str | None:
         )
     # The motion last: a folder with one is a step.
     new_folder, motion = step_folder(folder.out, step), motion_of(folder.out, step)
+    if motion.exists():
+        raise InputError(
+            f"{motion}: was written in the meantime by another `exoid investigate`, and is not"
+            " overwritten; let that one end"
+        )
     with folder_to_fill(new_folder), all_or_none(new_folder, last=motion.name) as new:
         shutil.copyfile(diagnosed, new / verdict_before(folder.out, step).name)
         write_motion(new / motion.name, result.design, folder.experiment)

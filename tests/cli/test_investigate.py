@@ -116,6 +116,25 @@ def test_the_budget_ends_it(exoid, folder, diagnosed, budget, why):
     assert not (folder / "investigation" / "1").exists()
 
 
+def test_a_second_one_at_the_same_time_does_not_replace_the_first_one_s_motion(
+    exoid, folder, diagnosed, monkeypatch
+):
+    diagnosed(EASY)
+    compare, motion = investigate.compare_experiments, folder / "investigation/1/trajectory.parquet"
+
+    def and_the_other_one_is_faster(*arguments):
+        result = compare(*arguments)
+        motion.parent.mkdir(parents=True)
+        motion.write_text("the other one's")
+        return result
+
+    monkeypatch.setattr(investigate, "compare_experiments", and_the_other_one_is_faster)
+    done = exoid("investigate")
+    assert done.code == 2
+    assert "written in the meantime by another `exoid investigate`" in done.err
+    assert motion.read_text() == "the other one's"
+
+
 def test_where_no_motion_can_decide_it_says_what_can(exoid, folder, monkeypatch):
     # At the knee Coulomb asymmetry is a torque offset, whatever moves.
     text = json.dumps(decision_of(ties=("torque_offset",))).replace("cogging", "coulomb_asymmetry")
