@@ -39,6 +39,8 @@ def next_(
     """
     folder = folder or Path("diagnosed")
     experiment = settings_in_force(config)
+    if output:
+        _refuse_place(output, folder)
     result = compare_experiments(folder, experiment, config)
     best = result.design
     if output and best:
@@ -61,6 +63,23 @@ def next_(
             f"\n{file}: name it as the trajectory of a run in exoid.toml, and record it;"
             " `exoid investigate` does both."
         )
+
+
+def _refuse_place(output: Path, folder: Path) -> None:
+    """Refuse a file that cannot be written, or that recordings followed, before the search."""
+    from pipelines.contracts import TRAJECTORY
+    from pipelines.contracts.atomic import open_folder
+    from pipelines.errors import InputError
+    from pipelines.workflow.investigation import motions_of
+
+    TRAJECTORY.refuse_place(output)
+    if output.resolve() in motions_of(folder.resolve().parent):
+        raise InputError(
+            f"{output}: is the motion that the diagnosed recordings followed, not overwritten; name"
+            " another file"
+        )
+    if output.parent.exists():
+        open_folder(output.parent)
 
 
 def compare_experiments(

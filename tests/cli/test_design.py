@@ -188,6 +188,31 @@ def test_next_says_what_decides_and_writes_the_motion(tmp_path, config, capsys):
     assert TRAJECTORY.read(out).metadata["criterion"] == "separation"
 
 
+@pytest.mark.parametrize(
+    ("name", "message"),
+    [
+        ("trajectory.parquet", "the motion that the diagnosed recordings followed"),
+        ("investigation/1/trajectory.parquet", "the motion that the diagnosed recordings followed"),
+        ("diagnosed", "is a folder"),
+        ("next.txt", "ends in .parquet"),
+    ],
+)
+def test_next_refuses_a_place_before_it_searches(
+    name, message, tmp_path, config, monkeypatch, capsys
+):
+    write_verdict(tmp_path, **decision_of(ties=()))
+    leave_open(tmp_path / "diagnosed", "rotor_inertia", "knee")
+    motion = tmp_path / "investigation" / "1" / "trajectory.parquet"
+    motion.parent.mkdir(parents=True)
+    motion.touch()
+    monkeypatch.setattr("exoid_cli.next_.compare_experiments", None)
+    words = ["next", str(tmp_path / "diagnosed"), "--config", config, "-o", str(tmp_path / name)]
+    assert run(words) == 2
+    said = capsys.readouterr().err
+    assert message in " ".join(said.split())
+    assert motion.stat().st_size == 0
+
+
 def test_next_says_that_it_writes_no_motion_where_none_separates_the_causes(
     tmp_path, config, capsys
 ):
