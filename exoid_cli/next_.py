@@ -7,7 +7,7 @@ import typer
 
 from exoid_cli.console import console
 from exoid_cli.excitation import write_excitation
-from exoid_cli.experiment_folder import settings_in_force
+from exoid_cli.experiment_folder import NAME, settings_in_force
 from exoid_cli.options import ConfigOption
 from exoid_cli.separate import question_of
 
@@ -38,6 +38,9 @@ def next_(
       exoid next diagnosed -o next.parquet
     """
     folder = folder or Path("diagnosed")
+    beside = folder.resolve().parent / NAME
+    # The diagnosed recordings and their motions are of that experiment, wherever this is called.
+    config = config or (beside if beside.is_file() else None)
     experiment = settings_in_force(config)
     if output:
         _refuse_place(output, folder)

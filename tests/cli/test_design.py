@@ -7,6 +7,7 @@ import pytest
 
 from exoid_cli.app import run
 from pipelines.contracts import TRAJECTORY
+from pipelines.errors import InputError
 from pipelines.settings import datasets
 from tests.report.sessions import AXIS, decision_of, write_verdict
 
@@ -211,6 +212,27 @@ def test_next_refuses_a_place_before_it_searches(
     said = capsys.readouterr().err
     assert message in " ".join(said.split())
     assert motion.stat().st_size == 0
+
+
+def test_next_takes_the_settings_beside_the_verdict_wherever_it_is_called(
+    tmp_path, config, monkeypatch
+):
+    write_verdict(tmp_path, **decision_of(ties=()))
+    leave_open(tmp_path / "diagnosed", "rotor_inertia", "knee")
+    elsewhere = tmp_path / "elsewhere"
+    elsewhere.mkdir()
+    monkeypatch.chdir(elsewhere)
+    used = []
+
+    def compare(*given):
+        used.append(given)
+        raise InputError("compared")
+
+    monkeypatch.setattr("exoid_cli.next_.compare_experiments", compare)
+    assert run(["next", "../diagnosed"]) == 2
+    ((_, experiment, file),) = used
+    assert file.samefile(config)
+    assert experiment.design.particles == 16
 
 
 def test_next_says_that_it_writes_no_motion_where_none_separates_the_causes(
