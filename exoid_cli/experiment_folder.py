@@ -95,6 +95,9 @@ def inputs_and_folder(
 
 def why_no_step(stage: str, run: str | None = None) -> str:
     """Say why an experiment has no step of a stage, or none for a run."""
+    base, plus, step = (run or "").partition("+")
+    if plus:
+        return f"there is no step {step} of an investigation, which would record run {base} again"
     if run:
         return f"the recording of run {run} was imported, and no command makes it"
     if stage in ("design", "acquire"):

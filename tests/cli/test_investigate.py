@@ -168,6 +168,12 @@ def test_a_real_rig_s_recordings_keep_the_motion_that_they_followed(exoid, folde
     assert (folder / "trajectory.parquet").read_bytes() == before
 
 
+def test_a_run_of_a_step_that_does_not_exist_is_not_called_imported(exoid, folder):
+    done = exoid("acquire", "--run", "exo_alone_train+7")
+    assert done.code == 2
+    assert "there is no step 7 of an investigation" in done.err
+
+
 def test_recordings_of_other_tools_are_refused(exoid, folder):
     write_recording(folder, imported={"map": "map.toml"})
     done = exoid("investigate")
