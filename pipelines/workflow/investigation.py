@@ -75,31 +75,26 @@ def refuse_lost_motion(experiment: Experiment, out: Path) -> None:
     InputError
         Names the missing motion, and a file that depends on it.
     """
-    names = {run.name for run in experiment.run}
-    lost = [
-        file
-        for file in sorted((out / "recordings").glob("*+*.parquet"))
-        if _is_of_a_lost_step(file, names)
-    ]
-    motion = motion_of(out, last_step(out) + 1)
-    later = sorted((out / "investigation").glob("*/trajectory.parquet"))
-    lost += [
-        file
-        for file in later
-        if file.parent.name.isdecimal() and int(file.parent.name) > last_step(out)
-    ]
+    names, last = {run.name for run in experiment.run}, last_step(out)
+    recordings = sorted((out / "recordings").glob("*+*.parquet"))
+    lost = [file for file in recordings if _step_of(file, names) > last]
+    for motion in sorted((out / "investigation").glob("*/trajectory.parquet")):
+        step = motion.parent.name
+        if step.isdecimal() and int(step) > last:
+            lost.append(motion)
     if lost:
         raise InputError(
-            f"{motion}: no such file, so {lost[0]} would be left out of all results; put the motion"
-            " back, or move what depends on it to another folder"
+            f"{motion_of(out, last + 1)}: no such file, so {lost[0]} would be left out of all"
+            " results; put the motion back, or move what depends on it to another folder"
         )
 
 
-def _is_of_a_lost_step(recording: Path, names: set[str]) -> bool:
+def _step_of(recording: Path, names: set[str]) -> int:
+    """Return the step that a run with one of some names was recorded in; 0 for other files."""
     base, _, step = recording.stem.partition("+")
-    if recording.stem in names or base not in names or not step.isdecimal():
-        return False
-    return "imported" not in metadata_of(recording)
+    if base not in names or not step.isdecimal() or "imported" in metadata_of(recording):
+        return 0
+    return int(step)
 
 
 def refuse_lost_verdicts(out: Path) -> None:

@@ -94,6 +94,10 @@ def test_a_recording_whose_motion_is_missing_is_not_left_out_of_results(folder):
         refuse_lost_motion(load(folder), folder)
     with pytest.raises(InputError, match="no such file"):
         split(Experiment.load(folder / "exoid.toml"), folder / ".settings")
+    # An imported run is not repeated, although a motion is there.
+    motion_of(folder, 2).touch()
+    refuse_lost_motion(load(folder, ImportedRuns(frozenset({"exo_alone_train"}))), folder)
+    motion_of(folder, 2).unlink()
     # A run that exoid.toml no longer has is left out on purpose.
     recording.rename(recording.with_name("former+2.parquet"))
     refuse_lost_motion(load(folder), folder)
