@@ -5,6 +5,7 @@ import json
 import pytest
 
 from exoid_cli import investigate
+from pipelines.investigation.separation import Separation
 from pipelines.settings.template import create
 from tests.report.sessions import decision_of, write_recording, write_verdict
 
@@ -104,7 +105,9 @@ def test_where_acquisition_is_at_fault_no_motion_can_help(exoid, folder, monkeyp
         ("least_probability = 1.0", "and investigate.least_probability is 1"),
     ],
 )
-def test_the_budget_ends_it(exoid, folder, diagnosed, budget, why):
+def test_the_budget_ends_it(exoid, folder, diagnosed, budget, why, monkeypatch):
+    # Where the motion decides in each simulated experiment, no least probability is too high.
+    monkeypatch.setattr(Separation, "decides", lambda self: 0.9)
     diagnosed(EASY)
     with (folder / "exoid.toml").open("a") as file:
         file.write(f"[investigate]\n{budget}\n")
