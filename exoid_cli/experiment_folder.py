@@ -38,8 +38,8 @@ class ExperimentFolder:
                 " investigate` adds steps, each with a motion"
             )
         raise InputError(
-            f"{self.out / NAME}: {why_no_step(stage, run)}; name the files to read and, with -o,"
-            " what to write"
+            f"{self.experiment.path}: {why_no_step(stage, run)}; name the files to read and, with"
+            " -o, what to write"
         )
 
 
@@ -62,12 +62,12 @@ def open_experiment(
     """Return the experiment to work on.
 
     Without one, the error begins with ``problem``. Unless ``allow_damaged``, an experiment with a
-    damaged recording is refused.
+    damaged recording, or without the motion of one, is refused.
     """
     from pipelines.settings import Experiment
     from pipelines.workflow.graph import graph
     from pipelines.workflow.imported import with_imported
-    from pipelines.workflow.investigation import with_investigation
+    from pipelines.workflow.investigation import refuse_lost_motion, with_investigation
 
     file = config or Path(NAME)
     if not config and not in_experiment_folder():
@@ -82,6 +82,7 @@ def open_experiment(
     experiment = with_investigation(experiment, imported, folder)
     if not allow_damaged:
         imported.refuse_damaged()
+        refuse_lost_motion(experiment, folder)
     steps = graph(experiment, file, folder, imported)
     return ExperimentFolder(experiment, steps, folder, imported)
 

@@ -37,14 +37,16 @@ def investigate(
       exoid investigate --config my_experiment/exoid.toml --yes
     """
     from pipelines.workflow.graph import needed_for
-    from pipelines.workflow.investigation import last_step
+    from pipelines.workflow.investigation import last_step, refuse_lost_verdicts
     from pipelines.workflow.split import split
 
     folder = open_experiment(config, out)
     _refuse_without_rig(folder)
+    refuse_lost_verdicts(folder.out)
     while True:
         # First, so that make, called next, finds every result newer than its settings.
         split(folder.experiment, folder.out / ".settings")
+        _refuse_to_record_again(folder)
         wanted = needed_for([folder.step("diagnose")], folder.steps)
         bring_up_to_date(
             context, folder, wanted, before=partial(ask_before, folder.experiment, yes=yes)
@@ -71,6 +73,26 @@ def _refuse_without_rig(folder: ExperimentFolder) -> None:
     rig = folder.experiment.file(folder.experiment.acquire.rig)
     if is_recording_only(rig):
         raise InputError(f"{rig}: is recording_only, so exoid moves nothing by it; {instead}")
+
+
+def _refuse_to_record_again(folder: ExperimentFolder) -> None:
+    """Refuse where a real rig's recording is stale, before the motion it followed is replaced."""
+    from pipelines.workflow.freshness import Freshness, Judge
+    from pipelines.workflow.imported import real_rig_of
+
+    changed: tuple[str, ...] = ()
+    for judged in Judge(folder.out).all(folder.steps):
+        if judged.step.stage == "design" and not judged.done:
+            changed = judged.why or (f"{judged.step.target} is missing",)
+        if judged.step.stage != "acquire" or judged.state is not Freshness.STALE:
+            continue
+        rig = real_rig_of(judged.step.target)
+        if rig is not None:
+            reason = (changed or judged.why)[0]
+            raise InputError(
+                f"{judged.step.target}: is a recording of the rig {rig}, and nothing records it"
+                f" again ({reason}); undo that change, or begin anew with --out DIR"
+            )
 
 
 def _doubt(folder: ExperimentFolder) -> "Doubt":
@@ -122,6 +144,11 @@ def _add_step(folder: ExperimentFolder, step: int) -> str | None:
         )
     # The motion last: a folder with one is a step.
     new_folder, motion = step_folder(folder.out, step), motion_of(folder.out, step)
+    if motion.exists():
+        raise InputError(
+            f"{motion}: was written in the meantime by another `exoid investigate`, and is not"
+            " overwritten; let that one end"
+        )
     with folder_to_fill(new_folder), all_or_none(new_folder, last=motion.name) as new:
         shutil.copyfile(diagnosed, new / verdict_before(folder.out, step).name)
         write_motion(new / motion.name, result.design, folder.experiment)

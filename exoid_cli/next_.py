@@ -7,7 +7,7 @@ import typer
 
 from exoid_cli.console import console
 from exoid_cli.excitation import write_excitation
-from exoid_cli.experiment_folder import settings_in_force
+from exoid_cli.experiment_folder import NAME, settings_in_force
 from exoid_cli.options import ConfigOption
 from exoid_cli.separate import question_of
 
@@ -38,7 +38,12 @@ def next_(
       exoid next diagnosed -o next.parquet
     """
     folder = folder or Path("diagnosed")
+    beside = folder.resolve().parent / NAME
+    # The diagnosed recordings and their motions are of that experiment, wherever this is called.
+    config = config or (beside if beside.is_file() else None)
     experiment = settings_in_force(config)
+    if output:
+        _refuse_place(output, folder)
     result = compare_experiments(folder, experiment, config)
     best = result.design
     if output and best:
@@ -61,6 +66,23 @@ def next_(
             f"\n{file}: name it as the trajectory of a run in exoid.toml, and record it;"
             " `exoid investigate` does both."
         )
+
+
+def _refuse_place(output: Path, folder: Path) -> None:
+    """Refuse a file that cannot be written, or that recordings followed, before the search."""
+    from pipelines.contracts import TRAJECTORY
+    from pipelines.contracts.atomic import open_folder
+    from pipelines.errors import InputError
+    from pipelines.workflow.investigation import motions_of
+
+    TRAJECTORY.refuse_place(output)
+    if output.resolve() in motions_of(folder.resolve().parent):
+        raise InputError(
+            f"{output}: is the motion that the diagnosed recordings followed, not overwritten; name"
+            " another file"
+        )
+    if output.parent.exists():
+        open_folder(output.parent)
 
 
 def compare_experiments(

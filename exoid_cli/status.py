@@ -18,7 +18,8 @@ def status(config: ConfigOption = None, out: OutOption = None) -> None:
     """Say of each stage of an experiment whether it is done, stale and why, or missing.
 
     A result is stale where an input or a setting has changed since it was made. An imported
-    recording that cannot be read has a line of its own, and makes the exit code 2.
+    recording that cannot be read has a line of its own, and makes the exit code 2,
+    as the missing motion of a recording does.
 
     \b
     Examples:
@@ -26,6 +27,7 @@ def status(config: ConfigOption = None, out: OutOption = None) -> None:
       exoid status --config my_experiment/exoid.toml
     """
     from pipelines.workflow.freshness import Judge
+    from pipelines.workflow.investigation import refuse_lost_motion
 
     folder = open_experiment(config, out, allow_damaged=True)
     judged = Judge(folder.out).all(folder.steps)
@@ -42,6 +44,7 @@ def status(config: ConfigOption = None, out: OutOption = None) -> None:
     console.table(("stage", "state", "result", "why"), rows)
     # After the table, so that the state of all else is seen.
     folder.imported.refuse_damaged()
+    refuse_lost_motion(folder.experiment, folder.out)
     todo = sum(not one.done for one in judged)
     to_do = (
         f"{todo} of {len(judged)} steps {'is' if todo == 1 else 'are'} to do; `exoid run` does what"

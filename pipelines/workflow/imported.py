@@ -109,12 +109,18 @@ def refuse_recorded(path: Path) -> None:
     InputError
         Names the path and the rig.
     """
-    rig = metadata_of(path).get("config", {}).get("rig", {})
-    if rig and not rig["embedded"]:
+    rig = real_rig_of(path)
+    if rig is not None:
         raise InputError(
-            f"{path}: is a recording of the rig {rig['name']}, not overwritten; --overwrite"
+            f"{path}: is a recording of the rig {rig}, not overwritten; --overwrite"
             " replaces it, -o writes another file"
         )
+
+
+def real_rig_of(recording: Path) -> str | None:
+    """Return the name of the real rig that made a recording; None for any other file."""
+    rig = metadata_of(recording).get("config", {}).get("rig", {})
+    return rig["name"] if rig and not rig["embedded"] else None
 
 
 def _imported(paths: Iterable[Path]) -> Iterator[tuple[str, dict[str, Any]]]:

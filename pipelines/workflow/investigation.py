@@ -7,7 +7,9 @@ to end its doubt. Every [[run]] is repeated along the motion, as run ``NAME+K`` 
 from itertools import chain, count, takewhile
 from pathlib import Path
 
-from pipelines.contracts.verdict import Verdict
+from pipelines.contracts.provenance import metadata_of
+from pipelines.contracts.verdict import Verdict, read
+from pipelines.errors import ContractError, InputError
 from pipelines.settings.acquire import step_of
 from pipelines.settings.experiment import Experiment
 from pipelines.workflow.imported import ImportedRuns
@@ -74,3 +76,59 @@ def with_investigation(experiment: Experiment, imported: ImportedRuns, out: Path
     steps = range(1, last_step(out) + 1)
     further = chain.from_iterable([run.repeated(step) for run in recorded] for step in steps)
     return experiment.model_copy(update={"run": (*own, *further)})
+
+
+def refuse_lost_motion(experiment: Experiment, out: Path) -> None:
+    """Refuse to leave out recordings because the motion that they followed is missing.
+
+    Parameters
+    ----------
+    experiment : Experiment
+        With the runs of its investigation.
+    out : Path
+        Folder of the results.
+
+    Raises
+    ------
+    InputError
+        Names the missing motion, and a file that depends on it.
+    """
+    names, last = {run.name for run in experiment.run}, last_step(out)
+    recordings = sorted((out / "recordings").glob("*+*.parquet"))
+    lost = [file for file in recordings if _step_of(file, names) > last]
+    for motion in sorted((out / "investigation").glob("*/trajectory.parquet")):
+        step = motion.parent.name
+        if step.isdecimal() and int(step) > last:
+            lost.append(motion)
+    if lost:
+        raise InputError(
+            f"{motion_of(out, last + 1)}: no such file, so {lost[0]} would be left out of all"
+            " results; put the motion back, or move what depends on it to another folder"
+        )
+
+
+def _step_of(recording: Path, names: set[str]) -> int:
+    """Return the step that a run with one of some names was recorded in; 0 for other files."""
+    base, _, step = recording.stem.partition("+")
+    if base not in names or not step.isdecimal() or "imported" in metadata_of(recording):
+        return 0
+    return int(step)
+
+
+def refuse_lost_verdicts(out: Path) -> None:
+    """Refuse a step without a whole verdict, before anything is recorded.
+
+    Raises
+    ------
+    InputError
+        Names the first file that is missing or damaged.
+    """
+    for step in range(1, last_step(out) + 1):
+        file = verdict_before(out, step)
+        try:
+            read(file)
+        except (OSError, ContractError) as error:
+            raise InputError(
+                f"{file}: is missing or damaged; `exoid diagnose` makes it again, from the"
+                f" recordings before step {step} and with -o to another folder"
+            ) from error

@@ -16,7 +16,7 @@ from pipelines.settings.rig import load_rig
 from pipelines.settings.rig.recording_only import is_recording_only
 from pipelines.workflow.graph import Step, graph, sealed_file
 from pipelines.workflow.imported import with_imported
-from pipelines.workflow.investigation import with_investigation
+from pipelines.workflow.investigation import refuse_lost_motion, with_investigation
 
 
 def split(experiment: Experiment, folder: Path) -> None:
@@ -24,6 +24,7 @@ def split(experiment: Experiment, folder: Path) -> None:
     experiment, imported = with_imported(experiment, folder.parent)
     imported.refuse_damaged()
     experiment = with_investigation(experiment, imported, folder.parent)
+    refuse_lost_motion(experiment, folder.parent)
     # Variables of make instead of paths, so that the rules hold in any folder.
     steps = graph(experiment, Path("$(CONFIG)"), Path("$(OUT)"), imported)
     sections = experiment.sections(

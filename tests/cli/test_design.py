@@ -7,6 +7,7 @@ import pytest
 
 from exoid_cli.app import run
 from pipelines.contracts import TRAJECTORY
+from pipelines.errors import InputError
 from pipelines.settings import datasets
 from tests.report.sessions import AXIS, decision_of, write_verdict
 
@@ -186,6 +187,52 @@ def test_next_says_what_decides_and_writes_the_motion(tmp_path, config, capsys):
     assert "Open: base tilt (0.67) or rotor inertia at the knee (0.33)." in printed
     assert all(f"\n{what} " in printed for what in ("repeat", "motion", "run", "test"))
     assert TRAJECTORY.read(out).metadata["criterion"] == "separation"
+
+
+@pytest.mark.parametrize(
+    ("name", "message"),
+    [
+        ("trajectory.parquet", "the motion that the diagnosed recordings followed"),
+        ("investigation/1/trajectory.parquet", "the motion that the diagnosed recordings followed"),
+        ("diagnosed", "is a folder"),
+        ("next.txt", "ends in .parquet"),
+    ],
+)
+def test_next_refuses_a_place_before_it_searches(
+    name, message, tmp_path, config, monkeypatch, capsys
+):
+    write_verdict(tmp_path, **decision_of(ties=()))
+    leave_open(tmp_path / "diagnosed", "rotor_inertia", "knee")
+    motion = tmp_path / "investigation" / "1" / "trajectory.parquet"
+    motion.parent.mkdir(parents=True)
+    motion.touch()
+    monkeypatch.setattr("exoid_cli.next_.compare_experiments", None)
+    words = ["next", str(tmp_path / "diagnosed"), "--config", config, "-o", str(tmp_path / name)]
+    assert run(words) == 2
+    said = capsys.readouterr().err
+    assert message in " ".join(said.split())
+    assert motion.stat().st_size == 0
+
+
+def test_next_takes_the_settings_beside_the_verdict_wherever_it_is_called(
+    tmp_path, config, monkeypatch
+):
+    write_verdict(tmp_path, **decision_of(ties=()))
+    leave_open(tmp_path / "diagnosed", "rotor_inertia", "knee")
+    elsewhere = tmp_path / "elsewhere"
+    elsewhere.mkdir()
+    monkeypatch.chdir(elsewhere)
+    used = []
+
+    def compare(*given):
+        used.append(given)
+        raise InputError("compared")
+
+    monkeypatch.setattr("exoid_cli.next_.compare_experiments", compare)
+    assert run(["next", "../diagnosed"]) == 2
+    ((_, experiment, file),) = used
+    assert file.samefile(config)
+    assert experiment.design.particles == 16
 
 
 def test_next_says_that_it_writes_no_motion_where_none_separates_the_causes(

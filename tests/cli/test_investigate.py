@@ -89,6 +89,20 @@ def test_an_open_verdict_leads_to_a_motion_and_all_runs_along_it(exoid, folder, 
     assert not (folder / "investigation" / "2").exists()
 
 
+def test_where_acquisition_is_at_fault_no_motion_can_help(exoid, folder, monkeypatch):
+    def bring_up_to_date(context, experiment, wanted, before):
+        write_verdict(experiment.out, **decision_of(**EASY))
+        file = experiment.out / "diagnosed" / "verdict.json"
+        at_fault = {"acquisition_at_fault": True, "findings": [], "posterior": None}
+        file.write_text(json.dumps(json.loads(file.read_text()) | at_fault))
+
+    monkeypatch.setattr(investigate, "bring_up_to_date", bring_up_to_date)
+    done = exoid("investigate", "--json")
+    assert done.code == 0, done.err
+    document = json.loads(done.out)
+    assert (document["state"], document["stopped_by"]) == ("at_fault", "no motion can help")
+
+
 @pytest.mark.parametrize(
     ("budget", "why"),
     [
@@ -111,6 +125,25 @@ def test_the_budget_ends_it(exoid, folder, diagnosed, budget, why, monkeypatch):
     assert not (folder / "investigation" / "1").exists()
 
 
+def test_a_second_one_at_the_same_time_does_not_replace_the_first_one_s_motion(
+    exoid, folder, diagnosed, monkeypatch
+):
+    diagnosed(EASY)
+    compare, motion = investigate.compare_experiments, folder / "investigation/1/trajectory.parquet"
+
+    def and_the_other_one_is_faster(*arguments):
+        result = compare(*arguments)
+        motion.parent.mkdir(parents=True)
+        motion.write_text("the other one's")
+        return result
+
+    monkeypatch.setattr(investigate, "compare_experiments", and_the_other_one_is_faster)
+    done = exoid("investigate")
+    assert done.code == 2
+    assert "written in the meantime by another `exoid investigate`" in done.err
+    assert motion.read_text() == "the other one's"
+
+
 def test_where_no_motion_can_decide_it_says_what_can(exoid, folder, monkeypatch):
     # At the knee Coulomb asymmetry is a torque offset, whatever moves.
     text = json.dumps(decision_of(ties=("torque_offset",))).replace("cogging", "coulomb_asymmetry")
@@ -125,15 +158,23 @@ def test_where_no_motion_can_decide_it_says_what_can(exoid, folder, monkeypatch)
     assert "switch the drive off" in done.out
 
 
-def test_where_acquisition_is_at_fault_no_motion_can_help(exoid, folder, monkeypatch):
-    def bring_up_to_date(context, experiment, wanted, before):
-        write_verdict(experiment.out, acquisition_at_fault=True, posterior=None, findings=[])
-
-    monkeypatch.setattr(investigate, "bring_up_to_date", bring_up_to_date)
-    done = exoid("investigate", "--json")
-    assert done.code == 0, done.err
-    document = json.loads(done.out)
-    assert (document["state"], document["stopped_by"]) == ("at_fault", "no motion can help")
+def test_a_real_rig_s_recordings_keep_the_motion_that_they_followed(exoid, folder, diagnosed):
+    recorded = diagnosed(EASY)
+    for name in ("exo_alone_train", "with_human_validate"):
+        rig = {"name": "lab", "embedded": False}
+        write_recording(
+            folder, name=f"{name}.parquet", config={"rig": rig, "acquire": {"sample_rate_hz": 9.0}}
+        )
+    assert exoid("design").code == 0
+    before = (folder / "trajectory.parquet").read_bytes()
+    with (folder / "exoid.toml").open("a") as file:
+        file.write("[design.noise]\nhip_nm = 0.5\n")
+    done = exoid("investigate", "--yes")
+    assert done.code == 2
+    assert "exo_alone_train.parquet: is a recording of the rig lab" in done.err
+    assert "design.noise.hip_nm was 0.6, is 0.5" in done.err
+    assert not recorded
+    assert (folder / "trajectory.parquet").read_bytes() == before
 
 
 def test_recordings_of_other_tools_are_refused(exoid, folder):

@@ -3,7 +3,7 @@
 import pytest
 
 from pipelines.contracts.verdict import read
-from pipelines.errors import SettingsError
+from pipelines.errors import InputError, SettingsError
 from pipelines.settings import Experiment
 from pipelines.settings.template import create
 from pipelines.workflow.graph import graph
@@ -12,6 +12,8 @@ from pipelines.workflow.investigation import (
     last_step,
     motion_of,
     motions_of,
+    refuse_lost_motion,
+    refuse_lost_verdicts,
     step_diagnosed,
     with_investigation,
 )
@@ -93,3 +95,38 @@ def test_make_has_the_same_rules(folder):
     split(Experiment.load(folder / "exoid.toml"), folder / ".settings")
     rules = (folder / ".settings" / "graph.mk").read_text()
     assert "$(OUT)/recordings/exo_alone_train+1.parquet: $(OUT)/investigation/1/" in rules
+
+
+def test_a_recording_whose_motion_is_missing_is_not_left_out_of_results(folder):
+    recording = folder / "recordings" / "exo_alone_train+2.parquet"
+    recording.parent.mkdir()
+    recording.touch()
+    refuse_lost_motion(load(folder), folder)
+    motion_of(folder, 2).unlink()
+    with pytest.raises(InputError, match=r"2.trajectory.parquet: no such file.*train\+2.parquet"):
+        refuse_lost_motion(load(folder), folder)
+    with pytest.raises(InputError, match="no such file"):
+        split(Experiment.load(folder / "exoid.toml"), folder / ".settings")
+    # An imported run is not repeated, although a motion is there.
+    motion_of(folder, 2).touch()
+    refuse_lost_motion(load(folder, ImportedRuns(frozenset({"exo_alone_train"}))), folder)
+    motion_of(folder, 2).unlink()
+    # A run that exoid.toml no longer has is left out on purpose.
+    recording.rename(recording.with_name("former+2.parquet"))
+    refuse_lost_motion(load(folder), folder)
+
+
+def test_a_step_whose_motion_is_missing_is_not_designed_again_before_a_later_one(folder):
+    motion_of(folder, 1).unlink()
+    with pytest.raises(InputError, match=r"1.trajectory.parquet: no such file.*2.trajectory"):
+        refuse_lost_motion(load(folder), folder)
+
+
+@pytest.mark.parametrize("content", [None, '{"status": "o'])
+def test_a_step_without_a_whole_verdict_is_refused(folder, content):
+    if content:
+        (folder / "investigation" / "1" / "verdict.json").write_text(content)
+    with pytest.raises(
+        InputError, match=r"1.verdict.json: is missing or damaged; .* before step 1"
+    ):
+        refuse_lost_verdicts(folder)
