@@ -39,7 +39,8 @@ def excitations(
     from pipelines.workflow.investigation import motions_of
 
     if config is not None or in_experiment_folder():
-        motions = motions_of(results or open_experiment(config).out, last)
+        folder = open_experiment(config)
+        motions = motions_of(folder.experiment, results or folder.out, last)
         files = [file for file in motions if file.is_file()]
         if files:
             return str(files[-1]), [read_trajectory(file) for file in files]

@@ -8,7 +8,7 @@ import typer
 
 from exoid_cli.confirm import ask_before
 from exoid_cli.console import console
-from exoid_cli.experiment_folder import ExperimentFolder, open_experiment
+from exoid_cli.experiment_folder import ExperimentFolder, open_experiment, why_no_step
 from exoid_cli.next_ import compare_experiments, show_experiments, write_motion
 from exoid_cli.options import ConfigOption, OutOption, YesOption
 from exoid_cli.stage_runner import bring_up_to_date
@@ -69,6 +69,8 @@ def _refuse_without_rig(folder: ExperimentFolder) -> None:
             f"{folder.experiment.path}: all its recordings were imported, and `exoid investigate`"
             f" records on a rig; {instead}"
         )
+    if not folder.of_stage("diagnose"):
+        raise InputError(f"{folder.experiment.path}: {why_no_step('diagnose')}; add one")
     folder.experiment.refuse_what_cannot_run()
     rig = folder.experiment.file(folder.experiment.acquire.rig)
     if is_recording_only(rig):

@@ -43,7 +43,7 @@ def next_(
     config = config or (beside if beside.is_file() else None)
     experiment = settings_in_force(config)
     if output:
-        _refuse_place(output, folder)
+        _refuse_place(output, folder, experiment)
     result = compare_experiments(folder, experiment, config)
     best = result.design
     if output and best:
@@ -68,7 +68,7 @@ def next_(
         )
 
 
-def _refuse_place(output: Path, folder: Path) -> None:
+def _refuse_place(output: Path, folder: Path, experiment: "Experiment") -> None:
     """Refuse a file that cannot be written, or that recordings followed, before the search."""
     from pipelines.contracts import TRAJECTORY
     from pipelines.contracts.atomic import open_folder
@@ -76,7 +76,8 @@ def _refuse_place(output: Path, folder: Path) -> None:
     from pipelines.workflow.investigation import motions_of
 
     TRAJECTORY.refuse_place(output)
-    if output.resolve() in motions_of(folder.resolve().parent):
+    followed = motions_of(experiment, folder.resolve().parent)
+    if output.resolve() in [file.resolve() for file in followed]:
         raise InputError(
             f"{output}: is the motion that the diagnosed recordings followed, not overwritten; name"
             " another file"

@@ -4,6 +4,7 @@ from dataclasses import dataclass, field
 from enum import Enum
 
 from pipelines.contracts.verdict import Finding, Posterior, Verdict
+from pipelines.wording.label import label_in_words
 
 NOTHING = "nothing"
 """Label of the rival that nothing is missing."""
@@ -46,11 +47,10 @@ def doubt_of(verdict: Verdict) -> Doubt:
         close = {label: p for label, p in posterior.causes.items() if p >= CLOSE}
         if close:
             return _open({NOTHING: posterior.nothing_missing, **close})
-        return Doubt(
-            State.NOTHING,
-            "nothing is missing that the recordings could show (probability"
-            f" {posterior.nothing_missing:.2f})",
-        )
+        words = f"nothing that the recordings could show ({_rounded(posterior.nothing_missing)})"
+        if posterior.unlisted >= CLOSE:
+            return _with_law(words)
+        return Doubt(State.NOTHING, f"missing is {words}")
     unsettled = [one for one in verdict.findings if not _is_settled(one)]
     named = {one.label for finding in verdict.findings for one in finding.causes}
     for finding in unsettled:
@@ -58,19 +58,29 @@ def doubt_of(verdict: Verdict) -> Doubt:
         if len(rivals) > 1:
             return _open(rivals)
     if unsettled:
-        one = unsettled[0]
-        return Doubt(
-            State.UNLISTED,
-            f"open: {one.words} ({one.probability:.2f}), or an unlisted law, which no motion can be"
-            " planned for",
-        )
-    settled = ", ".join(f"{f.words} ({f.probability:.2f})" for f in verdict.findings)
+        return _with_law(f"{unsettled[0].words} ({_rounded(unsettled[0].probability)})")
+    settled = ", ".join(f"{f.words} ({_rounded(f.probability)})" for f in verdict.findings)
     return Doubt(State.NAMED, f"decided: {settled}")
 
 
 def _open(rivals: dict[str, float]) -> Doubt:
-    words = " or ".join(f"{label} ({p:.2f})" for label, p in rivals.items())
-    return Doubt(State.OPEN, f"open: {words}", rivals)
+    words = (
+        f"{label if label == NOTHING else label_in_words(label)} ({_rounded(p)})"
+        for label, p in rivals.items()
+    )
+    return Doubt(State.OPEN, f"open: {' or '.join(words)}", rivals)
+
+
+def _with_law(words: str) -> Doubt:
+    return Doubt(
+        State.UNLISTED, f"open: {words}, or an unlisted law, which no motion can be planned for"
+    )
+
+
+def _rounded(probability: float) -> str:
+    """Return a probability in words, and never ``DECIDED`` for one that is below it."""
+    text = f"{probability:.2f}"
+    return f"{probability:.4f}" if probability < DECIDED <= float(text) else text
 
 
 def _is_settled(finding: Finding) -> bool:

@@ -40,18 +40,25 @@ def last_step(out: Path) -> int:
     return sum(1 for _ in takewhile(lambda step: motion_of(out, step).is_file(), count(1)))
 
 
-def motions_of(out: Path, last: int | None = None) -> list[Path]:
-    """Return the motions of an experiment: the designed excitation, and that of each step.
+def motions_of(experiment: Experiment, out: Path, last: int | None = None) -> list[Path]:
+    """Return the motions of an experiment: those of its own runs, and that of each step.
 
     Parameters
     ----------
+    experiment : Experiment
+        A run of it may have an excitation of its own.
     out : Path
         Folder of the results.
     last : int, optional
         The last step that counts; by default all that have a motion.
     """
     steps = last_step(out) if last is None else min(last, last_step(out))
-    return [out / "trajectory.parquet"] + [motion_of(out, step) for step in range(1, steps + 1)]
+    own = [
+        experiment.file(run.trajectory) if run.trajectory else out / "trajectory.parquet"
+        for run in experiment.run
+        if not run.step
+    ]
+    return [*dict.fromkeys(own), *(motion_of(out, step) for step in range(1, steps + 1))]
 
 
 def step_diagnosed(verdict: Verdict) -> int:

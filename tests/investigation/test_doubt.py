@@ -69,6 +69,19 @@ def test_nothing_is_decided_unless_a_cause_is_close(doubt):
     assert found.probabilities == pytest.approx({NOTHING: 0.67, "cogging@knee": 0.3})
 
 
+def test_nothing_is_not_decided_where_an_unlisted_law_is_likely(doubt):
+    def change(document):
+        document["findings"] = []
+        document["posterior"] |= {"nothing_missing": 0.55, "unlisted": 0.4, "causes": {}}
+
+    assert doubt(change).state is State.UNLISTED
+
+
+def test_what_is_not_decided_is_not_shown_as_if_it_were(doubt):
+    found = doubt(ties=(), nothing=0.0544, law=0.0)
+    assert "(0.9456)" in found.words
+
+
 def test_where_acquisition_is_at_fault_nothing_is_said_of_physics(doubt):
     def change(document):
         document.update(acquisition_at_fault=True, posterior=None, findings=[])

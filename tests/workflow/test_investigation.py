@@ -60,7 +60,19 @@ def test_an_imported_run_is_not_repeated(folder):
 def test_a_step_without_a_motion_and_those_after_it_do_not_count(folder):
     motion_of(folder, 1).unlink()
     assert last_step(folder) == 0
-    assert motions_of(folder) == [folder / "trajectory.parquet"]
+    assert motions_of(load(folder), folder) == [folder / "trajectory.parquet"]
+
+
+def test_a_run_s_own_excitation_is_a_motion_of_the_experiment(folder):
+    text = (folder / "exoid.toml").read_text()
+    mine = 'purpose = "train"\ntrajectory = "mine.toml"\n'
+    (folder / "exoid.toml").write_text(text.replace('purpose = "train"\n', mine, 1))
+    assert motions_of(load(folder), folder) == [
+        folder / "mine.toml",
+        folder / "trajectory.parquet",
+        motion_of(folder, 1),
+        motion_of(folder, 2),
+    ]
 
 
 def test_a_motion_whose_recordings_were_not_diagnosed_does_not_count(folder):
@@ -69,7 +81,7 @@ def test_a_motion_whose_recordings_were_not_diagnosed_does_not_count(folder):
         write_verdict(folder, inputs=inputs)
         verdict = read(folder / "diagnosed" / "verdict.json")
         assert step_diagnosed(verdict) == last
-        motions = motions_of(folder, step_diagnosed(verdict))
+        motions = motions_of(load(folder), folder, step_diagnosed(verdict))
         assert motions == [folder / "trajectory.parquet", motion_of(folder, 1)][: last + 1]
 
 
