@@ -93,7 +93,7 @@ def _refuse_to_record_again(folder: ExperimentFolder) -> None:
             reason = (changed or judged.why)[0]
             raise InputError(
                 f"{judged.step.target}: is a recording of the rig {rig}, and nothing records it"
-                f" again ({reason}); undo that change, or begin anew with --out DIR"
+                f" again ({reason}); undo that change, or begin again with --out DIR"
             )
 
 

@@ -38,9 +38,9 @@ def next_(
       exoid next diagnosed -o next.parquet
     """
     folder = folder or Path("diagnosed")
-    beside = folder.resolve().parent / NAME
+    own = folder.resolve().parent / NAME
     # The diagnosed recordings and their motions are of that experiment, wherever this is called.
-    config = config or (beside if beside.is_file() else None)
+    config = config or (own if own.is_file() else None)
     experiment = settings_in_force(config)
     if output:
         _refuse_place(output, folder, experiment)
