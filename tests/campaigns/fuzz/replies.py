@@ -13,8 +13,6 @@ from pathlib import Path
 from random import Random
 from tempfile import TemporaryDirectory
 
-import numpy as np
-
 from pipelines.acquisition.machine.drive import Drive
 from pipelines.acquisition.machine.force_sensor import Sensor
 from pipelines.acquisition.machine.machine import Machine
@@ -277,9 +275,8 @@ def _load(text: str, folder: Path) -> RigSettings:
     return load_rig(path)
 
 
-async def fuzz(seed: int, inputs: int, only: int | None = None, seconds: float = np.inf) -> Outcome:
-    """Try so many replies, or as many as there is time for; ``only`` one operation to see it
-    again."""
+async def fuzz(seed: int, inputs: int, only: int | None = None) -> Outcome:
+    """Try so many replies; ``only`` one operation to see it again."""
     outcome = Outcome("replies", seed)
     errors = _listen_to_asyncio()
     rigs = hostile_rigs()
@@ -287,7 +284,7 @@ async def fuzz(seed: int, inputs: int, only: int | None = None, seconds: float =
         Client(rigs[k % len(rigs)]) for k in range(SIDE_BY_SIDE if only is None else len(rigs))
     ]
     numbers = iter(range(1 << 60)) if only is None else iter([only] * len(rigs))
-    until, before = time.monotonic() + seconds, peak_mib()
+    before = peak_mib()
 
     async def work(client: Client) -> None:
         await client.open()
@@ -307,7 +304,7 @@ async def fuzz(seed: int, inputs: int, only: int | None = None, seconds: float =
                     client.peer.transcript,
                 )
             await client.renew()
-            if sum(c.peer.answered for c in clients) >= inputs or time.monotonic() > until:
+            if sum(c.peer.answered for c in clients) >= inputs:
                 break
         await client.end()
 

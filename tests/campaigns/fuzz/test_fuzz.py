@@ -14,20 +14,20 @@ from tests.campaigns.fuzz import replies, requests
 from tests.campaigns.fuzz.frames import Frame
 
 SEED = 20261121
-SECONDS = 2.0
+INPUTS = 200
 READ_14 = b"\x03\x1c" + bytes(28)
 
 
 def test_hostile_replies_are_refused_in_one_line_and_never_taken_for_right():
-    outcome = asyncio.run(replies.fuzz(SEED, 100_000, seconds=SECONDS))
+    outcome = asyncio.run(replies.fuzz(SEED, INPUTS))
     assert not outcome.failures
-    assert outcome.inputs > 100 and outcome.counts["refused"] and outcome.counts["accepted"]
+    assert outcome.inputs >= INPUTS and outcome.counts["refused"] and outcome.counts["accepted"]
 
 
 def test_hostile_requests_leave_the_rig_serving_whoever_asks_politely():
-    outcome = requests.fuzz(SEED, 100_000, seconds=SECONDS)
+    outcome = requests.fuzz(SEED, INPUTS)
     assert not outcome.failures
-    assert outcome.inputs > 100 and outcome.counts["refused"] and outcome.counts["answered"]
+    assert outcome.inputs >= INPUTS and outcome.counts["refused"] and outcome.counts["answered"]
 
 
 @pytest.fixture
