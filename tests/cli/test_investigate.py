@@ -10,7 +10,7 @@ from pipelines.investigation.separation import Separation
 from pipelines.settings.template import create
 from tests.report.sessions import decision_of, write_recording, write_verdict
 
-SEARCH = "[design]\nharmonics = 2\nparticles = 8\niterations = 5\n"
+SEARCH = "[design]\nharmonics = 2\nparticles = 8\niterations = 5\nseconds = 2.0\n"
 COGGING = [
     ("amplitude", 1.5, "N·m"),
     ("cycles_per_turn", 9.0, "1/turn"),
