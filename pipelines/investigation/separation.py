@@ -18,6 +18,7 @@ counts. If nothing is missing, the further runs do not show again what noise see
 import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -29,7 +30,7 @@ from pipelines.diagnosis.detectability.detectability import NEVER_APART
 from pipelines.diagnosis.detectability.detection_problem import DetectionProblem
 from pipelines.diagnosis.selection.marginal_likelihood import power
 from pipelines.investigation.doubt import DECIDED
-from pipelines.investigation.sized_rival import Appearance, SizedRival
+from pipelines.investigation.sized_rival import Appearance, SizedRival, parts_of
 
 Pair = tuple[str, str]
 """Labels of two rivals."""
@@ -76,9 +77,14 @@ class Separation:
             How many of the problem's runs, the first ones, these are.
         """
         rows = len(problem.outputs)
+        # Once of each shape, since a motion's torques take most of a search.
+        parts = [{one: parts_of(one, problem) for one in sized.shapes} for sized in rivals]
         own = tuple(
-            np.array([truth.torque(problem) for truth in sized.truths] or [np.zeros(rows)])
-            for sized in rivals
+            np.array(
+                [truth.torque(problem, of_rival[truth.candidate]) for truth in sized.truths]
+                or [np.zeros(rows)]
+            )
+            for sized, of_rival in zip(rivals, parts, strict=True)
         )
         weights = _weights(own, problem)
         weighted = problem.weighted(weights)
@@ -94,8 +100,8 @@ class Separation:
                 for one, before, sized in zip(own, known, rivals, strict=True)
             ),
             tuple(
-                tuple(Appearance.of(shape, weighted) for shape in sized.shapes) or (no_span,)
-                for sized in rivals
+                tuple(Appearance.of(*one, weighted) for one in of_rival.items()) or (no_span,)
+                for of_rival in parts
             ),
             # Runs without a usable row, as of a machine at rest, cost nothing and show nothing.
             0.5 * float(np.log(max(problem.independent, 1.0))),
@@ -115,32 +121,39 @@ class Separation:
         The mean over the truth's shapes; of the rival, the shape counts that is most alike.
         Diagnosed runs only add to what the others show.
         """
-        return np.array([one.mean(axis=0) for one in self._odds_of_truths(priced=True)])
+        prices = [self.prices(j) for j in range(len(self.rivals))]
+        return np.array([one.mean(axis=0) for one in self._odds_of_truths(prices)])
 
-    def _odds_of_truths(self, priced: bool) -> list[NDArray]:
-        """Return the expected log odds of each size of each truth, (n, R).
+    @cached_property
+    def _free(self) -> list[NDArray]:
+        """Prices of all shapes where amplitudes cost nothing."""
+        return [np.zeros(len(own)) for own in self.shapes]
 
-        Unless ``priced``, amplitudes cost nothing: what T-optimality maximizes.
-        """
+    @cached_property
+    def _free_odds(self) -> list[NDArray]:
+        """What T-optimality maximizes: log odds (n, R) of each truth where amplitudes are free."""
+        return self._odds_of_truths(self._free)
+
+    def _odds_of_truths(self, prices: Sequence[NDArray]) -> list[NDArray]:
+        """Return the expected log odds of each size of each truth, (n, R), at some prices."""
         result = []
         for i, truths in enumerate(self.truths):
             lost = np.array(
                 [
                     np.min(
                         [
-                            -0.5 * _squared(truths @ one.span) + priced * price
-                            for one, price in zip(shapes, self.prices(j), strict=True)
+                            -0.5 * _squared(truths @ one.span) + price
+                            for one, price in zip(shapes, costs, strict=True)
                         ],
                         axis=0,
                     )
-                    for j, shapes in enumerate(self.shapes)
+                    for shapes, costs in zip(self.shapes, prices, strict=True)
                 ]
             ).T
             result.append(lost - lost[:, i : i + 1])
         if self.earlier is None:
             return result
-        earlier = self.earlier._odds_of_truths(priced=False)
-        return [now - before for now, before in zip(result, earlier, strict=True)]
+        return [now - before for now, before in zip(result, self.earlier._free_odds, strict=True)]
 
     def log_loss(self) -> float:
         """Return the expected log loss of the posterior, bounded pair by pair.
@@ -152,7 +165,7 @@ class Separation:
         parts /= parts.sum()
         prior = np.array([sized.rival.probability for sized in self.rivals])
         loss = 0.0
-        for i, odds in enumerate(self._odds_of_truths(priced=False)):
+        for i, odds in enumerate(self._free_odds):
             mean = np.maximum(odds, 0.0)[:, :, np.newaxis]
             against = np.log(prior / prior[i])[:, np.newaxis]
             lost = np.logaddexp(0.0, against - mean - np.sqrt(2.0 * mean) * nodes) @ parts
@@ -211,7 +224,7 @@ class Separation:
 
     def as_json(self) -> dict[str, Any]:
         """Return the rivals, the expected log odds, and the posterior to expect."""
-        posterior = self.posterior()
+        posterior = self._simulated
         return {
             "rivals": [
                 {"cause": sized.rival.label, "probability": sized.rival.probability}
@@ -225,7 +238,12 @@ class Separation:
     def decides(self) -> float:
         """Return the probability that the true rival has ``DECIDED`` afterwards."""
         prior = np.array([sized.rival.probability for sized in self.rivals])
-        return float(prior @ decided(self.posterior()))
+        return float(prior @ decided(self._simulated))
+
+    @cached_property
+    def _simulated(self) -> NDArray:
+        """The posteriors of simulated experiments, as many as are usual."""
+        return self.posterior()
 
     def posterior(self, draws: int = 400, seed: int = 1) -> NDArray:
         """Simulate the experiment and return the posteriors of all rivals under each truth.
@@ -251,8 +269,8 @@ class Separation:
             y = own[of_draw] + rng.standard_normal((draws, len(self.noise))) * self.noise
             log = self._evidence(y, prices) + prior
             if self.earlier:
-                free = [np.zeros(len(own)) for own in self.shapes]
-                log -= self.earlier._evidence(self.earlier.truths[i], free)[of_draw]
+                known = self.earlier._evidence(self.earlier.truths[i], self.earlier._free)
+                log -= known[of_draw]
             result[i] = np.exp(log - logsumexp(log, axis=1, keepdims=True))
         return result
 

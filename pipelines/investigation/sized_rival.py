@@ -32,17 +32,18 @@ class Truth:
     linear: NDArray | None = None
     """(k,) amplitudes; None for a first amplitude of 1, with others that suit it."""
 
-    def torque(self, problem: DetectionProblem) -> NDArray:
+    def torque(self, problem: DetectionProblem, parts: list[NDArray] | None = None) -> NDArray:
         """Return its torque in the rows of a problem, (rows,).
 
-        Without what the baseline explains, in units of the noise.
+        Without what the baseline explains, in units of the noise. ``parts`` are those of its
+        candidate, if they are known: ``parts_of``.
         """
-        candidate = _in_runs_of(self.candidate, problem)
+        parts = parts_of(self.candidate, problem) if parts is None else parts
         if self.linear is None:
-            parts = _direction(candidate, problem)
+            torque = _direction(self.candidate, parts, problem)
         else:
-            parts = [c @ self.linear[:, np.newaxis] for c in _parts(candidate, problem)]
-        return self.factor * problem.remainder(parts)[:, 0]
+            torque = [c @ self.linear[:, np.newaxis] for c in parts]
+        return self.factor * problem.remainder(torque)[:, 0]
 
 
 @dataclass(frozen=True)
@@ -66,12 +67,12 @@ class Appearance:
     """Half the log determinant of the Gram matrix of its columns: how well amplitudes are known."""
 
     @classmethod
-    def of(cls, candidate: Candidate, problem: DetectionProblem) -> "Appearance":
-        """Compute it for a shape in planned or recorded runs."""
-        candidate = _in_runs_of(candidate, problem)
-        own = candidate.columns_in([run.motion.run for run in problem.runs])
-        parts = _parts(candidate, problem)
+    def of(
+        cls, candidate: Candidate, parts: list[NDArray], problem: DetectionProblem
+    ) -> "Appearance":
+        """Compute it for a shape and its parts in planned or recorded runs."""
         if not candidate.transforms_motion:
+            own = candidate.columns_in([run.motion.run for run in problem.runs])
             parts = [own.expand(c, r) for r, c in enumerate(parts)]
         columns = problem.remainder(parts)
         span = orthonormal(columns)
@@ -80,23 +81,24 @@ class Appearance:
         return cls(span, float(np.log(sizes[sizes > 0.0]).sum()))
 
 
-def _in_runs_of(candidate: Candidate, problem: DetectionProblem) -> Candidate:
-    """Return a candidate for the runs of a problem; planned runs have equal shapes."""
-    return Candidate(candidate.effect, (candidate.shapes[0],) * len(problem.runs))
+def parts_of(candidate: Candidate, problem: DetectionProblem) -> list[NDArray]:
+    """Return the torque of each amplitude of a candidate, (m, O, k) of each run.
 
-
-def _direction(candidate: Candidate, problem: DetectionProblem) -> list[NDArray]:
-    """Return the torque at a first amplitude of 1, (m, O, 1) of each run."""
-    if candidate.transforms_motion:
-        return bend(candidate, problem)
-    return direction_of(candidate.effect, _parts(candidate, problem), problem)
-
-
-def _parts(candidate: Candidate, problem: DetectionProblem) -> list[NDArray]:
-    """Return the torque of each amplitude, (m, O, k) of each run."""
+    Planned runs have equal shapes.
+    """
+    candidate = Candidate(candidate.effect, (candidate.shapes[0],) * len(problem.runs))
     if candidate.transforms_motion:
         return bend(candidate, problem)
     return [torque_columns(candidate, r, run) for r, run in enumerate(problem.runs)]
+
+
+def _direction(
+    candidate: Candidate, parts: list[NDArray], problem: DetectionProblem
+) -> list[NDArray]:
+    """Return the torque at a first amplitude of 1, (m, O, 1) of each run, from its parts."""
+    if candidate.transforms_motion:
+        return parts
+    return direction_of(candidate.effect, parts, problem)
 
 
 def sized(rivals: Sequence[Rival], problem: DetectionProblem) -> list[SizedRival]:
@@ -188,7 +190,7 @@ def _as_seen(
     tolerance = 2.0
     truths, explained = list[list[Truth]](), list[float]()
     for candidate in grid:
-        columns = problem.remainder(_parts(candidate, problem))
+        columns = problem.remainder(parts_of(candidate, problem))
         gram = columns.T @ columns + np.diag(1.0 / _typical(candidate) ** 2)
         if not columns.any():
             continue
@@ -219,7 +221,7 @@ def _around(candidate: Candidate, linear: NDArray, covariance: NDArray) -> list[
 
 def _factor(candidate: Candidate, length: float | None, problem: DetectionProblem) -> float:
     """Return the factor at which a candidate's torque is so long, or has a usual size."""
-    direction = _direction(candidate, problem)
+    direction = _direction(candidate, parts_of(candidate, problem), problem)
     if length is not None:
         unit = float(np.linalg.norm(problem.remainder(direction)))
         return length / unit if unit > 0.0 else np.inf
