@@ -107,18 +107,21 @@ def _doubt(folder: ExperimentFolder) -> "Doubt":
 def _why_to_stop(folder: ExperimentFolder, doubt: "Doubt") -> str | None:
     """Return why no further experiment is made; None where one would help and is affordable."""
     from pipelines.investigation.doubt import State
+    from pipelines.workflow.investigation import repeated_runs
 
     if doubt.state in (State.NAMED, State.NOTHING):
         return "nothing is left open"
     if doubt.state is not State.OPEN:
         return "no motion can help"
-    runs = folder.experiment.run
-    own = [run for run in runs if not run.step and run.name not in folder.imported.names]
+    further = [run for run in folder.experiment.run if run.step]
+    further += repeated_runs(folder.experiment, folder.imported)
     budget = folder.experiment.investigate
-    count = sum(run.step > 0 for run in runs) + len(own)
-    minutes = sum(run.duration_s for run in [*(run for run in runs if run.step), *own]) / 60.0
-    if count > budget.runs:
-        return f"another step would make {count} further runs, investigate.runs is {budget.runs}"
+    minutes = sum(run.duration_s for run in further) / 60.0
+    if len(further) > budget.runs:
+        return (
+            f"another step would make {len(further)} further runs, investigate.runs is"
+            f" {budget.runs}"
+        )
     if minutes > budget.minutes:
         return (
             f"another step would make {minutes:.3g} further minutes, investigate.minutes is"

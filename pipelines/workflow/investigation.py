@@ -10,7 +10,7 @@ from pathlib import Path
 from pipelines.contracts.provenance import metadata_of
 from pipelines.contracts.verdict import Verdict, read
 from pipelines.errors import ContractError, InputError
-from pipelines.settings.acquire import step_of
+from pipelines.settings.acquire import RunSettings, step_of
 from pipelines.settings.experiment import Experiment
 from pipelines.workflow.imported import ImportedRuns
 
@@ -66,6 +66,11 @@ def step_diagnosed(verdict: Verdict) -> int:
     return max((step_of(Path(one.name).stem) for one in verdict.provenance.inputs), default=0)
 
 
+def repeated_runs(experiment: Experiment, imported: ImportedRuns) -> list[RunSettings]:
+    """Return the runs that each step repeats: no command records an imported one."""
+    return [run for run in experiment.run if not run.step and run.name not in imported.names]
+
+
 def with_investigation(experiment: Experiment, imported: ImportedRuns, out: Path) -> Experiment:
     """Return the experiment with the runs of its investigation.
 
@@ -74,14 +79,13 @@ def with_investigation(experiment: Experiment, imported: ImportedRuns, out: Path
     experiment : Experiment
         With its own runs.
     imported : ImportedRuns
-        No command records these, so none repeats them.
+        Runs of which none is repeated.
     out : Path
         Folder of the results.
     """
     own = [run for run in experiment.run if run.name in imported.names or not run.step]
-    recorded = [run for run in own if run.name not in imported.names]
-    steps = range(1, last_step(out) + 1)
-    further = chain.from_iterable([run.repeated(step) for run in recorded] for step in steps)
+    repeated, steps = repeated_runs(experiment, imported), range(1, last_step(out) + 1)
+    further = chain.from_iterable([run.repeated(step) for run in repeated] for step in steps)
     return experiment.model_copy(update={"run": (*own, *further)})
 
 
@@ -116,10 +120,8 @@ def refuse_lost_motion(experiment: Experiment, out: Path) -> None:
 
 def _step_of(recording: Path, names: set[str]) -> int:
     """Return the step that a run with one of some names was recorded in; 0 for other files."""
-    base, _, step = recording.stem.partition("+")
-    if base not in names or not step.isdecimal() or "imported" in metadata_of(recording):
-        return 0
-    return int(step)
+    step, base = step_of(recording.stem), recording.stem.partition("+")[0]
+    return step if step and base in names and "imported" not in metadata_of(recording) else 0
 
 
 def refuse_lost_verdicts(out: Path) -> None:
@@ -130,8 +132,7 @@ def refuse_lost_verdicts(out: Path) -> None:
     InputError
         Names the first file that is missing or damaged.
     """
-    for step in range(1, last_step(out) + 1):
-        file = verdict_before(out, step)
+    for step, file in enumerate(verdicts_before_steps(out), 1):
         try:
             read(file)
         except (OSError, ContractError) as error:
