@@ -6,7 +6,13 @@ from typing import Annotated, Any, Literal
 import typer
 
 from exoid_cli.console import console
-from exoid_cli.excitation import excitations, show_quality, warn_of_cut, write_excitation
+from exoid_cli.excitation import (
+    excitations,
+    planned_geometry,
+    show_quality,
+    warn_of_cut,
+    write_excitation,
+)
 from exoid_cli.experiment_folder import open_experiment, settings_in_force
 from exoid_cli.options import AgainOption, ConfigOption, output_option
 from exoid_cli.separate import design_separation, evaluate_separation, question_of
@@ -64,8 +70,6 @@ def design(
       exoid design --sizes cogging@knee=0.5 base_tilt=0.02 -o small.parquet
     """
     from pipelines.errors import InputError
-    from pipelines.mechanics.geometry import Geometry
-    from pipelines.mechanics.read import geometry_from
 
     if evaluate and output:
         raise InputError(
@@ -92,7 +96,7 @@ def design(
     experiment = settings_in_force(config)
     settings = experiment.design.changed(criterion=criterion, harmonics=harmonics, seed=seed)
     experiment.mechanism.refuse_all_but_the_leg("`exoid design`")
-    geometry = geometry_from(experiment) or Geometry()
+    geometry = planned_geometry(experiment)
     mechanism = experiment.sections("mechanism")
     if not decides and not sizes:
         if evaluate:

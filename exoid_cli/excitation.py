@@ -9,7 +9,17 @@ from exoid_cli.experiment_folder import in_experiment_folder, open_experiment
 if TYPE_CHECKING:
     from pipelines.design.excitation import Design
     from pipelines.design.quality import Quality
+    from pipelines.mechanics.geometry import Geometry
     from pipelines.mechanics.trajectory import Trajectory
+    from pipelines.settings import Experiment
+
+
+def planned_geometry(experiment: "Experiment") -> "Geometry":
+    """Return the lengths and the gravity with which an experiment is planned."""
+    from pipelines.mechanics.geometry import Geometry
+    from pipelines.mechanics.read import geometry_from
+
+    return geometry_from(experiment) or Geometry()
 
 
 def excitations(

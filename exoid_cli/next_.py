@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from exoid_cli.console import console
-from exoid_cli.excitation import write_excitation
+from exoid_cli.excitation import planned_geometry, write_excitation
 from exoid_cli.experiment_folder import NAME, settings_in_force
 from exoid_cli.options import ConfigOption
 from exoid_cli.separate import question_of
@@ -91,11 +91,9 @@ def compare_experiments(
 ) -> "NextExperiments":
     """Return the experiments that could end the doubt of the verdict in a folder."""
     from pipelines.investigation.next_experiments import next_experiments
-    from pipelines.mechanics.geometry import Geometry
-    from pipelines.mechanics.read import geometry_from
 
     experiment.mechanism.refuse_all_but_the_leg("`exoid next`")
-    geometry = geometry_from(experiment) or Geometry()
+    geometry = planned_geometry(experiment)
     question = question_of((), folder, experiment, experiment.design, config)
     with console.progress("designing", total=1.0) as report:
         return next_experiments(question.problem, geometry, question.last, report)
@@ -103,10 +101,7 @@ def compare_experiments(
 
 def write_motion(output: Path, design: "SeparatingDesign", experiment: "Experiment") -> None:
     """Write the excitation that separates rivals best."""
-    from pipelines.mechanics.geometry import Geometry
-    from pipelines.mechanics.read import geometry_from
-
-    geometry = geometry_from(experiment) or Geometry()
+    geometry = planned_geometry(experiment)
     mechanism = experiment.sections("mechanism")
     write_excitation(output, design.design, design.metadata(), geometry, mechanism)
 

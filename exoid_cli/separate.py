@@ -6,7 +6,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from exoid_cli.console import console
-from exoid_cli.excitation import excitations, show_quality, warn_of_cut, write_excitation
+from exoid_cli.excitation import (
+    excitations,
+    planned_geometry,
+    show_quality,
+    warn_of_cut,
+    write_excitation,
+)
 
 if TYPE_CHECKING:
     from pipelines.investigation.separation import Separation
@@ -41,9 +47,7 @@ def question_of(
     from pipelines.investigation.planned import PlannedRuns
     from pipelines.investigation.rivals import rivals_in_verdict, rivals_named
     from pipelines.investigation.separation_problem import SeparationProblem
-    from pipelines.mechanics.geometry import Geometry
     from pipelines.mechanics.machine import THE_LEG
-    from pipelines.mechanics.read import geometry_from
     from pipelines.workflow.investigation import step_diagnosed
 
     known = tuple(experiment.diagnose.known)
@@ -67,7 +71,7 @@ def question_of(
             )
     # The diagnosed recordings lie where the experiment's other results are.
     results = folder.resolve().parent if folder else None
-    geometry = geometry_from(experiment) or Geometry()
+    geometry = planned_geometry(experiment)
     name, motions = excitations(config, settings, geometry, results, last)
     if folder is not None:
         runs = runs.after(motions)

@@ -4,10 +4,8 @@ from dataclasses import dataclass, field
 from enum import Enum
 
 from pipelines.contracts.verdict import Finding, Posterior, Verdict
-from pipelines.wording.label import label_in_words
+from pipelines.wording.label import NOTHING, label_in_words
 
-NOTHING = "nothing"
-"""Label of the rival that nothing is missing."""
 DECIDED = 0.95
 """Posterior probability of one rival from which the others are excluded."""
 CLOSE = 1.0 - DECIDED

@@ -7,10 +7,10 @@ from pathlib import Path
 from pipelines.contracts.verdict import Verdict
 from pipelines.effects import Effect
 from pipelines.errors import InputError, about
-from pipelines.investigation.doubt import NOTHING, doubt_of
+from pipelines.investigation.doubt import doubt_of
 from pipelines.mechanics.machine import Machine
 from pipelines.model import Term, term_from
-from pipelines.wording.label import cause_at
+from pipelines.wording.label import NOTHING, cause_at
 
 SETTING = "--separate"
 

@@ -6,6 +6,7 @@ cause acts follows from its equation: a reaction of the drive or behind it, a sp
 and link, a reading of an angle or of a torque.
 """
 
+from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from typing import ClassVar
 
@@ -16,7 +17,7 @@ from pipelines.mechanics.machine import Machine
 
 
 @dataclass(frozen=True)
-class Sensor:
+class Sensor(ABC):
     """A sensor that could be added at one joint."""
 
     joint: str
@@ -24,13 +25,13 @@ class Sensor:
     """Whether its difference is zero where nothing is missing."""
 
     @property
+    @abstractmethod
     def words(self) -> str:
         """What to add, and where."""
-        raise NotImplementedError
 
+    @abstractmethod
     def shows(self, effect: Effect) -> bool:
         """Return whether a cause acts between the drive's own sensor and this one."""
-        raise NotImplementedError
 
     def separates(self, one: Effect | None, other: Effect | None) -> bool:
         """Return whether it shows one of two causes, or of a cause and none, and not the other."""

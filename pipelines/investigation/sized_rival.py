@@ -70,7 +70,7 @@ class Appearance:
     def of(
         cls, candidate: Candidate, parts: list[NDArray], problem: DetectionProblem
     ) -> "Appearance":
-        """Compute it for a shape and its parts in planned or recorded runs."""
+        """Compute it for a shape and its parts, (m, O, k) of each planned or recorded run."""
         if not candidate.transforms_motion:
             own = candidate.columns_in([run.motion.run for run in problem.runs])
             parts = [own.expand(c, r) for r, c in enumerate(parts)]

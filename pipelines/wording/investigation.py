@@ -6,6 +6,7 @@ from typing import Any
 
 from pipelines.contracts.provenance import metadata_of
 from pipelines.contracts.verdict import Verdict, read
+from pipelines.wording.label import NOTHING
 from pipelines.workflow.investigation import motion_of, verdicts_before_steps
 
 SHOWN_FROM = 0.05
@@ -23,7 +24,7 @@ class InvestigationStep:
     decides: float | None
     """The probability that it was expected to decide; None for step 0."""
     probabilities: dict[str, float]
-    """Of ``nothing`` and of each cause that has ``SHOWN_FROM`` in any step, by its label."""
+    """Of ``NOTHING`` and of each cause that has ``SHOWN_FROM`` in any step, by its label."""
 
     def as_json(self) -> dict[str, Any]:
         """Return it for programs."""
@@ -63,4 +64,4 @@ def _probabilities(verdict: Verdict) -> dict[str, float]:
     posterior = verdict.posterior
     if posterior is None:
         return {}
-    return {"nothing": posterior.nothing_missing, **posterior.causes}
+    return {NOTHING: posterior.nothing_missing, **posterior.causes}

@@ -13,6 +13,8 @@ from pipelines.wording.law import LAW, law_in_words
 if TYPE_CHECKING:
     from pipelines.contracts.verdict import Cause, Tie
 
+NOTHING = "nothing"
+"""In place of a cause's label: that nothing is missing."""
 SHARES = {
     "noise_floor": "noise floor",
     "repeatable_unexplained": "unexplained, repeats every period",

@@ -5,7 +5,8 @@ import json
 import pytest
 
 from pipelines.contracts.verdict import read
-from pipelines.investigation.doubt import NOTHING, State, doubt_of
+from pipelines.investigation.doubt import State, doubt_of
+from pipelines.wording.label import NOTHING
 from tests.report.sessions import decision_of, write_verdict
 
 

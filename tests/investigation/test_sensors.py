@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from pipelines.design.excitation import design
 from pipelines.investigation.next_experiments import next_experiments
 from pipelines.investigation.planned import PlannedRuns
 from pipelines.investigation.rivals import Rival, rivals_named
@@ -14,7 +15,6 @@ from pipelines.model import Term
 from pipelines.rig.plant import Plant
 from pipelines.settings.design import DesignSettings
 from pipelines.settings.rig.plant import PlantSettings
-from tests.investigation.test_separating_design import usual  # noqa: F401 - a fixture
 
 
 def effects(*labels):
@@ -75,10 +75,14 @@ def test_the_encoders_of_a_virtual_leg_differ_where_the_equations_say(label, joi
     assert shown_at(joint, label) == LinkEncoder(joint).shows(effect)
 
 
-def test_next_lists_sensors_that_separate_rivals(usual):  # noqa: F811
+def test_next_lists_sensors_that_separate_rivals():
     tilt, offset = effects("base_tilt", "encoder_offset@hip")
     rivals = [Rival(tilt, 0.6), Rival(offset, 0.4)]
-    runs = PlannedRuns(DesignSettings(harmonics=3, particles=12), PlantSettings(), ("exo_alone",))
+    settings = DesignSettings(harmonics=3, particles=12, iterations=50)
+    usual, runs = (
+        design(settings).trajectory,
+        PlannedRuns(settings, PlantSettings(), ("exo_alone",)),
+    )
     found = next_experiments(SeparationProblem.of(rivals, runs, usual), Geometry(), usual)
     sensors = [one for one in found.experiments if one.what == "sensor"]
     assert [(one.words, one.decides) for one in sensors] == [

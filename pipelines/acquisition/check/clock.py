@@ -131,12 +131,9 @@ def _check_time(probe: Probe, series: Series, clock: Clock, seconds: float) -> I
     reference = "by its counter" if probe.in_lockstep else "of this computer's clock"
     measured = f"its clock goes on by {rate:.4g} s in each second {reference}"
     for unit in DIMENSION["time"]:
-        is_other = unit != register.unit
-        if (
-            is_other
-            and rate
-            and abs(rate * UNITS[unit] / UNITS[register.unit] - 1.0) <= RATE_TOLERANCE
-        ):
+        if unit == register.unit or not rate:
+            continue
+        if abs(rate * UNITS[unit] / UNITS[register.unit] - 1.0) <= RATE_TOLERANCE:
             yield probe.finding(
                 f'{measured}; with unit = "{unit}" the two agree: correct {where}', "time"
             )

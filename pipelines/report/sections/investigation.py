@@ -4,7 +4,7 @@ from typing import Any
 
 from pipelines.report.session import Session
 from pipelines.wording.investigation import history
-from pipelines.wording.label import label_in_words
+from pipelines.wording.label import NOTHING, label_in_words
 from pipelines.workflow.investigation import last_step, verdicts_before_steps
 
 
@@ -21,12 +21,11 @@ def investigation(session: Session) -> dict[str, Any] | None:
         return None
     steps = history(out, session.verdict_file.path)
     labels = dict.fromkeys(label for one in steps for label in one.probabilities)
-    nothing = {"nothing": "nothing is missing"}
     return {
         "steps": [{"step": one.step, "runs": one.runs, "decides": one.decides} for one in steps],
         "rows": [
             {
-                "words": nothing.get(label) or label_in_words(label),
+                "words": "nothing is missing" if label == NOTHING else label_in_words(label),
                 "probabilities": [one.probabilities.get(label, 0.0) for one in steps],
             }
             for label in labels
