@@ -66,6 +66,15 @@ def test_ties_are_named_that_are_likely_together_though_each_is_less_probable_th
     assert answer_of(weighed(_=0.3, _4=0.3, _2=0.28, _5=0.12)).named == ()
 
 
+def test_inseparable_causes_that_are_each_likely_are_ties_and_not_both_named():
+    # Each is in more than half of the sets, as a few sets have both.
+    (named,) = answer_of(weighed(_2=0.48, _3=0.46, _23=0.06)).named
+    assert named.members == {"quadratic_drag@hip", "stribeck_friction@hip"}
+    assert named.probability == pytest.approx(1.0)
+    # Where most sets have both, both are missing.
+    assert len(answer_of(weighed(_2=0.25, _3=0.2, _23=0.55)).named) == 2
+
+
 def test_ties_that_are_likely_next_to_a_sure_cause_or_law_are_named_too():
     beside_law = answer_of(weighed(_4=0.3, _24=0.28, _34=0.25, _04=0.17)).named
     assert [one.members for one in beside_law] == [

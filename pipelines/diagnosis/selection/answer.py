@@ -100,9 +100,13 @@ def _best(posterior: Posterior) -> Set:
     The common part of most sets may be likely where the most probable single set lacks it (Barbieri
     and Berger, 2004, Annals of Statistics 32(3): the median probability model).
     """
-    likely = {label for label, p in posterior.marginals.items() if p >= CRITERIA.named_from}
-    # Labels may be likely each by itself, and never occur in one set.
-    sets = [own for own in posterior.by_labels if likely <= own] or list(posterior.by_labels)
+    likely, sets = frozenset[str](), list(posterior.by_labels)
+    # Two labels may be likely each by itself, and hardly ever occur in one set: each explains the
+    # other, as inseparable causes do.
+    for label, _ in sorted(posterior.marginals.items(), key=lambda pair: -pair[1]):
+        with_it = [own for own in sets if label in own]
+        if sum(posterior.by_labels[own] for own in with_it) >= CRITERIA.named_from:
+            likely, sets = likely | {label}, with_it
     # Rivals share the probability that there is one more cause, and each may have less than none.
     listed = {e.label for e in posterior.elements if not e.is_law}
     with_more = [own for own in sets if (own - likely) & listed]
