@@ -23,7 +23,7 @@ class NextExperiment:
     """``motion``, ``repeat``, ``run``, ``test`` or ``sensor``."""
     words: str
     decides: float
-    """Probability that the true rival has at least ``DECIDED`` afterwards."""
+    """Probability that the true cause is a rival, and has at least ``DECIDED`` afterwards."""
 
 
 @dataclass(frozen=True)

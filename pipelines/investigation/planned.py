@@ -7,7 +7,9 @@ from pathlib import Path
 import numpy as np
 
 from pipelines.contracts.verdict import Verdict
+from pipelines.diagnosis.detectability.detectability import by_noise, usual_candidates
 from pipelines.diagnosis.detectability.detection_problem import DetectionProblem
+from pipelines.diagnosis.detectability.directions import Trace, traces_of, with_background
 from pipelines.diagnosis.detectability.planned_runs import planned_motions, planned_noise
 from pipelines.diagnosis.evidence.baseline import baseline_of
 from pipelines.diagnosis.evidence.block_rate import at_block_rate
@@ -36,6 +38,8 @@ class PlannedRuns:
     diagnosed: tuple[Trajectory, ...] = ()
     """Motions of the runs that a diagnosis had, to which these are added."""
     diagnosed_kinds: tuple[str, ...] = ()
+    background: tuple[Trace, ...] = ()
+    """What even a good rig has of each cause."""
 
     def as_in_verdict(self, verdict: Verdict, file: Path) -> "PlannedRuns":
         """Return runs of the kinds, and with the noise, of a verdict in some file.
@@ -53,6 +57,10 @@ class PlannedRuns:
     def after(self, motions: Sequence[Trajectory]) -> "PlannedRuns":
         """Return runs that are added to diagnosed ones of the same kinds, with some motions."""
         return replace(self, diagnosed=tuple(motions), diagnosed_kinds=self.kinds)
+
+    def behind_background(self, problem: DetectionProblem) -> "PlannedRuns":
+        """Return runs of a rig that has a little of each cause, at the shape usual in a problem."""
+        return replace(self, background=traces_of(usual_candidates(by_noise(problem)), problem))
 
     def problem(self, motion: Trajectory, effects: Sequence[Effect]) -> DetectionProblem:
         """Return the detection problem of the diagnosed runs, if any, and those with a motion.
@@ -77,7 +85,10 @@ class PlannedRuns:
         self, planned: Sequence[tuple[Trajectory, tuple[str, ...]]], effects: Sequence[Effect]
     ) -> DetectionProblem:
         noise, rate_hz = self.settings.noise, self.settings.sample_rate_hz
-        periods, repeats = {motion.period_s for motion, _ in planned}, 1.0
+        # Of further motions, too, so that runs count alike in all problems of one search.
+        periods = {round(motion.period_s or 0.0, 9) for motion, _ in planned}
+        periods.add(round(1.0 / self.settings.base_frequency_hz, 9))
+        repeats = 1.0
         period_s = periods.pop() if len(periods) == 1 else None
         if period_s and period_s < noise.duration_s and not any(map(_depends_on_time, effects)):
             repeats = noise.duration_s / period_s
@@ -92,7 +103,16 @@ class PlannedRuns:
         floor = planned_noise(noise, rate_hz, observed[0].block)
         rms = floor.rms if self.noise_nm is None else np.array([*self.noise_nm, np.nan, np.nan])
         floor = replace(floor, rms=rms, independent_share=repeats * floor.independent_share)
-        return DetectionProblem.of([at_block_rate(run) for run in observed], baseline, floor)
+        problem = DetectionProblem.of([at_block_rate(run) for run in observed], baseline, floor)
+        # One period does not show what changes over several ones.
+        return with_background(
+            problem,
+            [
+                trace
+                for trace in self.background
+                if repeats == 1.0 or not _depends_on_time(trace.candidate.effect)
+            ],
+        )
 
 
 def _depends_on_time(effect: Effect) -> bool:

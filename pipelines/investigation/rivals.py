@@ -22,7 +22,7 @@ class Rival:
     effect: Effect | None
     """None for the rival that nothing is missing."""
     probability: float
-    """Of the rivals together one."""
+    """Of the rivals together at most one; the rest is that it is none of them."""
     term: Term | None = None
     """As a diagnosis fitted it."""
 
@@ -89,7 +89,6 @@ def rivals_in_verdict(verdict: Verdict, file: Path, machine: Machine) -> list[Ri
             f"{file}: leaves no choice of causes, which a motion could decide"
             f" ({doubt.words}); `exoid design {SETTING}` takes any causes"
         )
-    total = sum(doubt.probabilities.values())
     # Values that differ from run to run are no value of the next one.
     fitted = {
         cause.label: {p.name: p.value for p in cause.parameters}
@@ -99,11 +98,11 @@ def rivals_in_verdict(verdict: Verdict, file: Path, machine: Machine) -> list[Ri
     rivals = []
     for label, probability in doubt.probabilities.items():
         if label == NOTHING:
-            rivals.append(Rival(None, probability / total))
+            rivals.append(Rival(None, probability))
             continue
         effect = cause_at(label, machine, str(file))
         values = fitted.get(label)
         with about(file):
             term = term_from(effect, values) if values else None
-        rivals.append(Rival(term.effect if term else effect, probability / total, term))
+        rivals.append(Rival(term.effect if term else effect, probability, term))
     return rivals

@@ -1,8 +1,9 @@
 """How well runs separate rival causes: expected log odds, and the posterior to expect.
 
 A true cause A adds a torque r to the rows of a detection problem, which are in units of the noise
-and have no part that the baseline explains. A rival B with the orthonormal span Q explains |Q'r|²
-of it. The log likelihood of A then exceeds that of B by half of
+and have no part that the baseline explains. What a good rig has of every cause is noise, too, so
+rows are whitened (``DetectionProblem.whitened``). A rival B with the orthonormal span Q explains
+|Q'r|² of it. The log likelihood of A then exceeds that of B by half of
 
     |r|² - |Q'r|²
 
@@ -48,9 +49,12 @@ class Separation:
     """Each rival at all shapes with which it could explain another one."""
     price: float
     """Log likelihood that an amplitude costs which no earlier run shows."""
-    noise: NDArray
-    """(rows,) its standard deviation; below one where the model's error counts, and zero in runs
-    that were diagnosed: what they showed is known."""
+    problem: DetectionProblem
+    """Weighted: less where the model's error counts."""
+    root: NDArray
+    """(rows,) root of its weights."""
+    is_planned: NDArray
+    """(rows,) whether the run is not diagnosed yet; what the others showed is known."""
     unweighted: tuple[NDArray, ...]
     """As ``truths``, without weights, and with each rival's own torque in diagnosed runs."""
     earlier: "Separation | None"
@@ -92,20 +96,30 @@ class Separation:
         counts = (int(run.usable.sum()) for run in problem.runs)
         is_planned = np.concatenate([np.full(n, r >= diagnosed) for r, n in enumerate(counts)])
         known = earlier.unweighted if earlier else tuple(one * ~is_planned for one in own)
+        seen = [_seen(sized, rivals, known) for sized in rivals]
+        truths = [
+            _with_known(one, before, shown, root, weighted)
+            for one, before, shown in zip(own, known, seen, strict=True)
+        ]
+        if earlier:
+            # What diagnosed runs showed beside a truth is in part background, and shows again.
+            truths = [
+                one + is_planned * (earlier.background_of(before, shown) @ weighted.background.T)
+                for one, before, shown in zip(truths, known, seen, strict=True)
+            ]
         no_span = Appearance(np.zeros((rows, 0)))
         return cls(
             tuple(rivals),
-            tuple(
-                _with_known(one, before, _seen(sized, rivals, known), root, weighted)
-                for one, before, sized in zip(own, known, rivals, strict=True)
-            ),
+            tuple(weighted.whitened(one.T).T for one in truths),
             tuple(
                 tuple(Appearance.of(*one, weighted) for one in of_rival.items()) or (no_span,)
                 for of_rival in parts
             ),
             # Runs without a usable row, as of a machine at rest, cost nothing and show nothing.
             0.5 * float(np.log(max(problem.independent, 1.0))),
-            is_planned * root,
+            weighted,
+            root,
+            is_planned,
             own,
             earlier,
         )
@@ -114,6 +128,12 @@ class Separation:
     def labels(self) -> list[str]:
         """Of the rivals, ``effect@joint`` or ``nothing``."""
         return [sized.rival.label for sized in self.rivals]
+
+    @property
+    def _prior(self) -> NDArray:
+        """Probability (R,) of each rival if it is one of them."""
+        prior = np.array([sized.rival.probability for sized in self.rivals])
+        return prior / prior.sum()
 
     def log_odds(self) -> NDArray:
         """Return the expected log odds of each truth against each rival, (R, R), priors apart.
@@ -155,6 +175,27 @@ class Separation:
             return result
         return [now - before for now, before in zip(result, self.earlier._free_odds, strict=True)]
 
+    @cached_property
+    def _background_covariance(self) -> NDArray:
+        """Of the k sizes of the background, (k, k), after these runs."""
+        B = self.problem.background
+        return np.linalg.inv(np.eye(B.shape[1]) + B.T @ B)
+
+    def background_of(self, truths: NDArray, seen: NDArray | None) -> NDArray:
+        """Return the sizes of the background (n, k) to expect after what these runs showed.
+
+        Parameters
+        ----------
+        truths : (n, rows) array
+            The torque of some truths in these runs, unweighted.
+        seen : (rows,) array or None
+            What the runs showed; None where it is what each truth makes.
+        """
+        B = self.problem.background
+        if seen is None or not B.size:
+            return np.zeros((len(truths), B.shape[1]))
+        return (self.root * (seen - truths)) @ B @ self._background_covariance
+
     def log_loss(self) -> float:
         """Return the expected log loss of the posterior, bounded pair by pair.
 
@@ -163,8 +204,7 @@ class Separation:
         """
         nodes, parts = np.polynomial.hermite_e.hermegauss(15)
         parts /= parts.sum()
-        prior = np.array([sized.rival.probability for sized in self.rivals])
-        loss = 0.0
+        prior, loss = self._prior, 0.0
         for i, odds in enumerate(self._free_odds):
             mean = np.maximum(odds, 0.0)[:, :, np.newaxis]
             against = np.log(prior / prior[i])[:, np.newaxis]
@@ -236,7 +276,10 @@ class Separation:
         }
 
     def decides(self) -> float:
-        """Return the probability that the true rival has ``DECIDED`` afterwards."""
+        """Return the probability that the true rival has ``DECIDED`` afterwards.
+
+        Where the true cause is none of the rivals, nothing can be promised.
+        """
         prior = np.array([sized.rival.probability for sized in self.rivals])
         return float(prior @ decided(self._simulated))
 
@@ -261,12 +304,20 @@ class Separation:
             Truth, experiment, rival.
         """
         rng = np.random.default_rng(seed)
-        prior = np.log([sized.rival.probability for sized in self.rivals])
+        prior = np.log(self._prior)
         prices = [self.prices(j) for j in range(len(self.rivals))]
         result = np.zeros((len(self.rivals), draws, len(self.rivals)))
+        count = self.problem.background.shape[1]
+        unknown = np.eye(count)
+        if self.earlier:
+            unknown = np.linalg.cholesky(self.earlier._background_covariance)
         for i, own in enumerate(self.truths):
             of_draw = np.arange(draws) % len(own)
-            y = own[of_draw] + rng.standard_normal((draws, len(self.noise))) * self.noise
+            # That the model's form is not exact is noise, too: weighted rows have unit noise.
+            y = rng.standard_normal((draws, len(self.root)))
+            sizes = rng.standard_normal((draws, len(unknown))) @ unknown.T
+            y = self.is_planned * (y + sizes @ self.problem.background.T)
+            y = own[of_draw] + self.problem.whitened(y.T).T
             log = self._evidence(y, prices) + prior
             if self.earlier:
                 known = self.earlier._evidence(self.earlier.truths[i], self.earlier._free)

@@ -11,10 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipelines.diagnosis.candidates.candidate import Candidate
-from pipelines.diagnosis.candidates.columns import torque_columns
 from pipelines.diagnosis.criteria import CRITERIA
 from pipelines.diagnosis.detectability.detection_problem import DetectionProblem
-from pipelines.diagnosis.detectability.directions import bend, direction_of, orthonormal
+from pipelines.diagnosis.detectability.directions import orthonormal, parts_of, unit_torque
 from pipelines.diagnosis.detectability.shapes import shapes_of
 from pipelines.diagnosis.selection.prior import FEATURES, weights
 from pipelines.errors import InputError
@@ -40,7 +39,7 @@ class Truth:
         """
         parts = parts_of(self.candidate, problem) if parts is None else parts
         if self.linear is None:
-            torque = _direction(self.candidate, parts, problem)
+            torque = unit_torque(self.candidate, parts, problem)
         else:
             torque = [c @ self.linear[:, np.newaxis] for c in parts]
         return self.factor * problem.remainder(torque)[:, 0]
@@ -74,31 +73,11 @@ class Appearance:
         if not candidate.transforms_motion:
             own = candidate.columns_in([run.motion.run for run in problem.runs])
             parts = [own.expand(c, r) for r, c in enumerate(parts)]
-        columns = problem.remainder(parts)
+        columns = problem.whitened(problem.remainder(parts))
         span = orthonormal(columns)
         sizes = np.linalg.svd(span.T @ columns, compute_uv=False)
         # An amplitude that does not show is not known at all, and has no size.
         return cls(span, float(np.log(sizes[sizes > 0.0]).sum()))
-
-
-def parts_of(candidate: Candidate, problem: DetectionProblem) -> list[NDArray]:
-    """Return the torque of each amplitude of a candidate, (m, O, k) of each run.
-
-    Planned runs have equal shapes.
-    """
-    candidate = Candidate(candidate.effect, (candidate.shapes[0],) * len(problem.runs))
-    if candidate.transforms_motion:
-        return bend(candidate, problem)
-    return [torque_columns(candidate, r, run) for r, run in enumerate(problem.runs)]
-
-
-def _direction(
-    candidate: Candidate, parts: list[NDArray], problem: DetectionProblem
-) -> list[NDArray]:
-    """Return the torque at a first amplitude of 1, (m, O, 1) of each run, from its parts."""
-    if candidate.transforms_motion:
-        return parts
-    return direction_of(candidate.effect, parts, problem)
 
 
 def sized(rivals: Sequence[Rival], problem: DetectionProblem) -> list[SizedRival]:
@@ -126,6 +105,7 @@ def sized(rivals: Sequence[Rival], problem: DetectionProblem) -> list[SizedRival
                 f" `exoid design {SETTING}` the other causes"
             )
     nothing = sum(rival.probability for rival in rivals if rival.effect is None)
+    nothing /= sum(rival.probability for rival in rivals)
     length = _seen_length(nothing, problem) if nothing > 0.0 else None
     seen = _seen(rivals, length, problem)
     return [_sized(rival, seen, length, problem) for rival in rivals]
@@ -141,12 +121,17 @@ def _seen(
     candidate = _candidate(term, problem)
     linear = None if candidate.transforms_motion else term.linear
     seen = Truth(candidate, 1.0, linear).torque(problem)
-    size = float(np.linalg.norm(seen))
+    size = _length(seen, problem)
     return seen * min(1.0, length / size) if length is not None and size > 0.0 else seen
 
 
 def _candidate(term: Term, problem: DetectionProblem) -> Candidate:
     return Candidate(term.effect, (tuple(term.shape.tolist()),) * len(problem.runs))
+
+
+def _length(torque: NDArray, problem: DetectionProblem) -> float:
+    """Return the length of a torque (rows,) as it shows against noise and background."""
+    return float(np.sqrt(problem.shown(torque)))
 
 
 def _seen_length(nothing: float, problem: DetectionProblem) -> float:
@@ -165,7 +150,7 @@ def _sized(
     if rival.effect is None:
         return SizedRival(rival, (), ())
     grid = list(shapes_of(rival.effect, problem.runs))
-    if rival.term is not None:
+    if rival.term is not None and seen is not None:
         own = _candidate(rival.term, problem)
         truths, grid = _as_seen([own], seen, problem), [own, *grid]
     elif seen is not None:
@@ -182,20 +167,19 @@ def _sized(
     return SizedRival(rival, tuple(truths), tuple(grid))
 
 
-def _as_seen(
-    grid: Sequence[Candidate], seen: NDArray | None, problem: DetectionProblem
-) -> list[Truth]:
+def _as_seen(grid: Sequence[Candidate], seen: NDArray, problem: DetectionProblem) -> list[Truth]:
     """Return the shapes that explain a torque (rows,) about as well as the best one does."""
     # Log likelihood by which a shape may be worse: the others have an eighth of its probability.
     tolerance = 2.0
     truths, explained = list[list[Truth]](), list[float]()
+    shown = problem.whitened(seen)
     for candidate in grid:
-        columns = problem.remainder(parts_of(candidate, problem))
+        columns = problem.whitened(problem.remainder(parts_of(candidate, problem)))
         gram = columns.T @ columns + np.diag(1.0 / _typical(candidate) ** 2)
         if not columns.any():
             continue
-        linear = np.linalg.solve(gram, columns.T @ seen)
-        explained.append(0.5 * float(seen @ columns @ linear))
+        linear = np.linalg.solve(gram, columns.T @ shown)
+        explained.append(0.5 * float(shown @ columns @ linear))
         truths.append(_around(candidate, linear, np.linalg.inv(gram)))
     best = max(explained, default=0.0)
     pairs = zip(truths, explained, strict=True)
@@ -221,9 +205,9 @@ def _around(candidate: Candidate, linear: NDArray, covariance: NDArray) -> list[
 
 def _factor(candidate: Candidate, length: float | None, problem: DetectionProblem) -> float:
     """Return the factor at which a candidate's torque is so long, or has a usual size."""
-    direction = _direction(candidate, parts_of(candidate, problem), problem)
+    direction = unit_torque(candidate, parts_of(candidate, problem), problem)
     if length is not None:
-        unit = float(np.linalg.norm(problem.remainder(direction)))
+        unit = _length(problem.remainder(direction)[:, 0], problem)
         return length / unit if unit > 0.0 else np.inf
     effect, share = candidate.effect, float(np.mean(CRITERIA.amplitudes))
     rms = problem.rms(effect, direction)

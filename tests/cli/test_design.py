@@ -184,7 +184,7 @@ def test_next_says_what_decides_and_writes_the_motion(tmp_path, config, capsys):
     out = tmp_path / "next.parquet"
     assert run(["next", str(folder), "--config", config, "-o", str(out)]) == 0
     printed = capsys.readouterr().out
-    assert "Open: base tilt (0.67) or rotor inertia at the knee (0.33)." in printed
+    assert "Open: base tilt (0.60) or rotor inertia at the knee (0.30)." in printed
     assert all(f"\n{what} " in printed for what in ("repeat", "motion", "run", "test"))
     assert TRAJECTORY.read(out).metadata["criterion"] == "separation"
 

@@ -35,7 +35,9 @@ from pipelines.diagnosis.detectability.directions import (
     levels,
     orthonormal,
     squared,
+    traces_of,
     unit_vector,
+    with_background,
 )
 from pipelines.diagnosis.detectability.shapes import shapes_of
 from pipelines.diagnosis.evidence.baseline import Baseline, baseline_of
@@ -195,6 +197,15 @@ def of_all_causes(
     problem: DetectionProblem, power: float, report: Report = silent
 ) -> dict[Effect, list[DetectionResult]]:
     """Return the smallest size of each cause at each plausible shape, behind the background."""
+    results = by_noise(problem, power, report)
+    problem = with_background(problem, traces_of(usual_candidates(results), problem))
+    return {e: [one.behind(problem, power) for one in own] for e, own in results.items()}
+
+
+def by_noise(
+    problem: DetectionProblem, power: float = 0.9, report: Report = silent
+) -> dict[Effect, list[DetectionResult]]:
+    """Return the smallest size of each cause at each plausible shape, by noise alone."""
     # An effect that the wearer may carry has the same name; the machine's is reported.
     motions = [run.motion for run in problem.runs]
     effects = [
@@ -206,8 +217,13 @@ def of_all_causes(
     for number, effect in enumerate(effects):
         report(number / len(effects), effect.label)
         results[effect] = at_each_shape(effect, problem, power)
-    problem = with_background(problem, {e: usual(own) for e, own in results.items()})
-    return {e: [one.behind(problem, power) for one in own] for e, own in results.items()}
+    return results
+
+
+def usual_candidates(results: Mapping[Effect, Sequence[DetectionResult]]) -> list[Candidate]:
+    """Return each cause that noise does not hide, at its usual shape."""
+    chosen = [usual(own) for own in results.values()]
+    return [one.candidate for one in chosen if np.isfinite(one.size)]
 
 
 def at_each_shape(effect: Effect, problem: DetectionProblem, power: float) -> list[DetectionResult]:
@@ -218,20 +234,6 @@ def at_each_shape(effect: Effect, problem: DetectionProblem, power: float) -> li
     ]
     # Where no shape is plausible, all count: every cause is reported.
     return [one for one in of_shapes if one.plausible] or of_shapes
-
-
-def with_background(
-    problem: DetectionProblem, results: Mapping[Effect, DetectionResult]
-) -> DetectionProblem:
-    """Return the problem with the background of a good rig, each cause at one shape."""
-    columns = []
-    for effect, one in results.items():
-        if np.isfinite(one.size):
-            at_smallest = np.sqrt(one.noncentrality) * one.remainder
-            torque = float(problem.torque_rms[problem.joint(effect)])
-            columns.append(CRITERIA.background_cause * torque / one.rms * at_smallest)
-    background = np.array(columns).T if columns else problem.background
-    return replace(problem, background=background)
 
 
 def usual(results: Sequence[DetectionResult]) -> DetectionResult:

@@ -68,14 +68,17 @@ class DetectionProblem:
             [(c @ values)[run.valid] for run, c in zip(runs, untouched, strict=True)]
         )
         rms = np.sqrt(np.mean(torque**2, axis=0))
-        nothing = np.zeros((0, 0))
+        nothing = np.zeros((sum(int(run.usable.sum()) for run in loaded), 0))
         return cls(
             loaded, baseline, untouched, values, root, independent, nothing, rms, nothing
         )._with_basis()
 
     def weighted(self, weights: NDArray) -> "DetectionProblem":
         """Return the problem with other weights of the outputs, (O,), as factors."""
-        return replace(self, root=self.root * np.sqrt(weights))._with_basis()
+        root = np.sqrt(weights)
+        problem = replace(self, root=self.root * root)._with_basis()
+        background = self.background * root[self.outputs, np.newaxis]
+        return replace(problem, background=problem._without_baseline(background))
 
     def _with_basis(self) -> "DetectionProblem":
         """Return the problem with the basis of its weighted baseline."""
@@ -117,29 +120,34 @@ class DetectionProblem:
         (rows, k) array
             In units of the noise.
         """
-        rows = self.rows(columns)
+        return self._without_baseline(self.rows(columns))
+
+    def _without_baseline(self, rows: NDArray) -> NDArray:
         for _ in range(2):  # twice is enough for orthogonality to rounding
             rows = rows - self.basis @ (self.basis.T @ rows)
         return rows
 
-    def shown(self, remainder: NDArray) -> float:
-        """Return the squared length of a remainder (rows,) that the background does not explain.
+    def whitened(self, remainder: NDArray) -> NDArray:
+        """Return a remainder, (rows,) or (rows, k), as it shows against noise and background.
 
         The background is marginalised, as in a diagnosis: with its columns B the noise has the
-        covariance I + BB'.
+        covariance I + BB', which is one after the product with (I + BB')^(-1/2).
         """
         B = self.background
-        if not B.size:
-            return float(remainder @ remainder)
-        # The minimum of |r - B z|² + |z|², which is that product without a difference of large
-        # numbers.
-        z = np.linalg.solve(self._background_gram, B.T @ remainder)
-        rest = remainder - B @ z
-        return float(rest @ rest + z @ z)
+        return remainder - B @ (self._taken @ (B.T @ remainder))
+
+    def shown(self, remainder: NDArray) -> float:
+        """Return the squared length of a remainder (rows,) that the background does not explain."""
+        return float(np.sum(self.whitened(remainder) ** 2))
 
     @cached_property
-    def _background_gram(self) -> NDArray:
-        return np.eye(self.background.shape[1]) + self.background.T @ self.background
+    def _taken(self) -> NDArray:
+        """The matrix M, (k, k), with (I + BB')^(-1/2) = I - BMB'."""
+        squares, axes = np.linalg.eigh(self.background.T @ self.background)
+        squares = np.maximum(squares, 0.0)
+        # (1 - 1 / root) / square, without a difference of nearly equal numbers.
+        root = np.sqrt(1.0 + squares)
+        return (axes / (root * (1.0 + root))) @ axes.T
 
     def joint(self, effect: Effect) -> int:
         """Return the joint at which an effect's size is given: its own, if it is measured.

@@ -1,16 +1,70 @@
 """The columns in which an effect shows, and all that its amplitudes can explain."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pipelines.diagnosis.candidates.candidate import Candidate
+from pipelines.diagnosis.candidates.columns import torque_columns
+from pipelines.diagnosis.criteria import CRITERIA
 from pipelines.diagnosis.detectability.detection_problem import DetectionProblem
 from pipelines.diagnosis.evidence.baseline_columns import columns_under
 from pipelines.diagnosis.evidence.observed_run import Run
 from pipelines.effects import Effect
 from pipelines.model import TermColumns
+
+
+def parts_of(candidate: Candidate, problem: DetectionProblem) -> list[NDArray]:
+    """Return the torque of each amplitude of a candidate, (m, O, k) of each run.
+
+    One that transforms the motion has one part, at the size of its shape. Runs have equal shapes.
+    """
+    candidate = Candidate(candidate.effect, (candidate.shapes[0],) * len(problem.runs))
+    if candidate.transforms_motion:
+        return bend(candidate, problem)
+    return [torque_columns(candidate, r, run) for r, run in enumerate(problem.runs)]
+
+
+def unit_torque(
+    candidate: Candidate, parts: list[NDArray], problem: DetectionProblem
+) -> list[NDArray]:
+    """Return the torque at a first amplitude of 1, (m, O, 1) of each run, from its parts."""
+    if candidate.transforms_motion:
+        return parts
+    return direction_of(candidate.effect, parts, problem)
+
+
+class Trace(NamedTuple):
+    """A little of a cause, as a good rig has it."""
+
+    candidate: Candidate
+    size: float
+    """Standard deviation of the first amplitude, or of the torque over that at the shape."""
+
+
+def traces_of(candidates: Iterable[Candidate], problem: DetectionProblem) -> tuple[Trace, ...]:
+    """Return what a good rig has of some candidates: shares of its torque in a problem's runs."""
+    traces = []
+    for candidate in candidates:
+        effect = candidate.effect
+        rms = problem.rms(effect, unit_torque(candidate, parts_of(candidate, problem), problem))
+        # Of one that makes no torque in these runs no share is known.
+        if rms > 0.0:
+            share = CRITERIA.background_cause * float(problem.torque_rms[problem.joint(effect)])
+            traces.append(Trace(candidate, share / rms))
+    return tuple(traces)
+
+
+def with_background(problem: DetectionProblem, traces: Sequence[Trace]) -> DetectionProblem:
+    """Return a problem with the background of a good rig."""
+    columns = []
+    for candidate, size in traces:
+        torque = unit_torque(candidate, parts_of(candidate, problem), problem)
+        columns.append(size * problem.remainder(torque)[:, 0])
+    return replace(problem, background=np.array(columns).T) if columns else problem
 
 
 def direction_of(

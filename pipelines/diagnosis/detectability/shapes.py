@@ -42,7 +42,9 @@ def _seen(effect: Effect, parameter: Parameter, runs: Sequence[Run], most: int =
     j = runs[0].motion.joint_index(effect.joint)
     speeds = np.concatenate([run.state[1][:, j] for run in runs])
     # A ripple of n cycles a turn has n |dq| / 2 pi Hz at the speed dq.
-    fastest = 2.0 * np.pi * runs[0].bandwidth_hz / float(np.sqrt(np.mean(speeds**2)))
+    rms = float(np.sqrt(np.mean(speeds**2)))
+    # A joint at rest shows no ripple, and then all stand for it.
+    fastest = 2.0 * np.pi * runs[0].bandwidth_hz / rms if rms > 0.0 else np.inf
     return _spread(values[values <= max(fastest, values[0])], most)
 
 
