@@ -109,10 +109,10 @@ def write_motion(output: Path, design: "SeparatingDesign", experiment: "Experime
 def show_experiments(result: "NextExperiments") -> None:
     """Show what is open, and what would decide it, the best first."""
     from pipelines.investigation.doubt import DECIDED
-    from pipelines.wording.label import in_words
+    from pipelines.wording.label import label_in_words
 
-    named = [(in_words(one.effect) if one.effect else one.label, one) for one in result.rivals]
-    causes = " or ".join(f"{words} ({one.probability:.2f})" for words, one in named)
+    named = [(label_in_words(one.label), one.probability) for one in result.rivals]
+    causes = " or ".join(f"{words} ({probability:.2f})" for words, probability in named)
     console.say(f"Open: {causes}.\n")
     headings = ("experiment", f"decides ({DECIDED:.2f})", "how")
     rows = [(one.what, f"{one.decides:.0%}", one.words) for one in result.experiments]

@@ -4,6 +4,7 @@ from dataclasses import dataclass, field
 from enum import Enum
 
 from pipelines.contracts.verdict import Finding, Posterior, Verdict
+from pipelines.investigation.law_shape import can_be_planned
 from pipelines.wording.label import NOTHING, label_in_words
 
 DECIDED = 0.95
@@ -62,10 +63,7 @@ def doubt_of(verdict: Verdict) -> Doubt:
 
 
 def _open(rivals: dict[str, float]) -> Doubt:
-    words = (
-        f"{label if label == NOTHING else label_in_words(label)} ({_rounded(p)})"
-        for label, p in rivals.items()
-    )
+    words = (f"{label_in_words(label)} ({_rounded(p)})" for label, p in rivals.items())
     return Doubt(State.OPEN, f"open: {' or '.join(words)}", rivals)
 
 
@@ -99,8 +97,12 @@ def _rivals(finding: Finding, posterior: Posterior, named: set[str]) -> dict[str
     }
     if finding.level != "cause":
         return rivals
-    # An unlisted law is a rival of which nothing can be planned.
-    rest = 1.0 - finding.probability - posterior.unlisted
+    rest = 1.0 - finding.probability
+    # A law that is more probable than the rest is there beside the finding, and not in its place.
+    # A few sets have both.
+    laws = {label: p for label, p in posterior.laws.items() if CLOSE <= p <= rest + CLOSE}
+    rivals |= {label: p for label, p in laws.items() if can_be_planned(label)}
+    rest -= posterior.unlisted
     for label, p in posterior.causes.items():
         if label not in named and CLOSE <= p <= rest:
             rivals[label] = p

@@ -88,9 +88,15 @@ def _tests(rivals: Sequence[Rival]) -> Iterator[NextExperiment]:
 
 def _sensors(rivals: Sequence[Rival], machine: Machine) -> Iterator[NextExperiment]:
     """Yield the sensors that separate two rivals or more."""
-    effects = [rival.effect for rival in rivals]
+    # Of an unlisted law it is not known where it acts.
     for sensor in sensors_for(machine):
-        apart = [[sensor.separates(one, other) for other in effects] for one in effects]
+        apart = [
+            [
+                not (one.law or other.law) and sensor.separates(one.effect, other.effect)
+                for other in rivals
+            ]
+            for one in rivals
+        ]
         if any(map(any, apart)):
             yield NextExperiment("sensor", sensor.words, _decides_by(apart, rivals))
 

@@ -1,4 +1,4 @@
-"""Rivals: the causes, or a cause and none, between which an experiment is to decide."""
+"""Rivals: causes, unlisted laws, or none, between which an experiment is to decide."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -11,6 +11,7 @@ from pipelines.investigation.doubt import doubt_of
 from pipelines.mechanics.machine import Machine
 from pipelines.model import Term, term_from
 from pipelines.wording.label import NOTHING, cause_at
+from pipelines.wording.law import LAW
 
 SETTING = "--separate"
 
@@ -20,16 +21,23 @@ class Rival:
     """A cause, how probable it is before the experiment, and what a diagnosis fitted."""
 
     effect: Effect | None
-    """None for the rival that nothing is missing."""
+    """None for an unlisted law, and for the rival that nothing is missing."""
     probability: float
     """Of the rivals together at most one; the rest is that it is none of them."""
     term: Term | None = None
     """As a diagnosis fitted it."""
+    law: str | None = None
+    """Label of an unlisted law."""
 
     @property
     def label(self) -> str:
-        """``effect@joint``, or ``nothing``."""
-        return self.effect.label if self.effect else NOTHING
+        """``effect@joint``, ``law:kind@joint``, or ``nothing``."""
+        return self.effect.label if self.effect else self.law or NOTHING
+
+    @property
+    def is_nothing(self) -> bool:
+        """Whether it is the rival that nothing is missing."""
+        return self.label == NOTHING
 
 
 def effects_of(rivals: Sequence[Rival]) -> list[Effect]:
@@ -65,7 +73,7 @@ def rivals_in_verdict(verdict: Verdict, file: Path, machine: Machine) -> list[Ri
     """Return the rivals between which a diagnosis did not decide, with its probabilities.
 
     They are those of the most probable finding in which no cause has ``DECIDED``. Where it may be
-    that nothing is missing, that is a rival, too.
+    that nothing is missing, or an unlisted law, that is a rival, too.
 
     Parameters
     ----------
@@ -97,12 +105,14 @@ def rivals_in_verdict(verdict: Verdict, file: Path, machine: Machine) -> list[Ri
     }
     rivals = []
     for label, probability in doubt.probabilities.items():
-        if label == NOTHING:
-            rivals.append(Rival(None, probability))
+        if label == NOTHING or label.startswith(LAW):
+            rivals.append(Rival(None, probability, law=None if label == NOTHING else label))
             continue
         effect = cause_at(label, machine, str(file))
         values = fitted.get(label)
         with about(file):
             term = term_from(effect, values) if values else None
         rivals.append(Rival(term.effect if term else effect, probability, term))
-    return rivals
+    # Without a fitted cause it is not known which torque a law has.
+    is_known = any(rival.term for rival in rivals)
+    return [rival for rival in rivals if is_known or not rival.law]

@@ -7,9 +7,9 @@ rows are whitened (``DetectionProblem.whitened``). A rival B with the orthonorma
 
     |r|² - |Q'r|²
 
-in the mean (T-optimality: Atkinson and Fedorov, 1975, Biometrika 62(1)). Each amplitude costs half
-the logarithm of the independent samples. As in a diagnosis, no form is exact: an output counts less
-where causes explain more of it.
+in the mean (T-optimality: Atkinson and Fedorov, 1975, Biometrika 62(1)). As in a diagnosis,
+amplitudes have a prior and are integrated out (``Appearance``), and no form is exact: an output
+counts less where causes explain more of it.
 
 After a diagnosis the rows are those of its runs and of further ones. What the former showed is
 known, and is in the probabilities of the rivals: only the difference of both log likelihoods
@@ -17,7 +17,7 @@ counts. If nothing is missing, the further runs do not show again what noise see
 """
 
 import itertools
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -31,7 +31,7 @@ from pipelines.diagnosis.detectability.detectability import NEVER_APART
 from pipelines.diagnosis.detectability.detection_problem import DetectionProblem
 from pipelines.diagnosis.selection.marginal_likelihood import power
 from pipelines.investigation.doubt import DECIDED
-from pipelines.investigation.sized_rival import Appearance, SizedRival, parts_of
+from pipelines.investigation.sized_rival import Appearance, SizedRival, parts_in
 
 Pair = tuple[str, str]
 """Labels of two rivals."""
@@ -47,8 +47,6 @@ class Separation:
     Diagnosed runs have what they showed, whichever is true."""
     shapes: tuple[tuple[Appearance, ...], ...]
     """Each rival at all shapes with which it could explain another one."""
-    price: float
-    """Log likelihood that an amplitude costs which no earlier run shows."""
     problem: DetectionProblem
     """Weighted: less where the model's error counts."""
     root: NDArray
@@ -82,7 +80,7 @@ class Separation:
         """
         rows = len(problem.outputs)
         # Once of each shape, since a motion's torques take most of a search.
-        parts = [{one: parts_of(one, problem) for one in sized.shapes} for sized in rivals]
+        parts = [{one: parts_in(problem, one) for one in sized.shapes} for sized in rivals]
         own = tuple(
             np.array(
                 [truth.torque(problem, of_rival[truth.candidate]) for truth in sized.truths]
@@ -107,16 +105,14 @@ class Separation:
                 one + is_planned * (earlier.background_of(before, shown) @ weighted.background.T)
                 for one, before, shown in zip(truths, known, seen, strict=True)
             ]
-        no_span = Appearance(np.zeros((rows, 0)))
+        nothing = Appearance(np.zeros((rows, 0)), np.zeros(0))
         return cls(
             tuple(rivals),
             tuple(weighted.whitened(one.T).T for one in truths),
             tuple(
-                tuple(Appearance.of(*one, weighted) for one in of_rival.items()) or (no_span,)
+                tuple(Appearance.of(*one, weighted) for one in of_rival.items()) or (nothing,)
                 for of_rival in parts
             ),
-            # Runs without a usable row, as of a machine at rest, cost nothing and show nothing.
-            0.5 * float(np.log(max(problem.independent, 1.0))),
             weighted,
             root,
             is_planned,
@@ -141,39 +137,33 @@ class Separation:
         The mean over the truth's shapes; of the rival, the shape counts that is most alike.
         Diagnosed runs only add to what the others show.
         """
-        prices = [self.prices(j) for j in range(len(self.rivals))]
-        return np.array([one.mean(axis=0) for one in self._odds_of_truths(prices)])
+        return np.array([one.mean(axis=0) for one in self._odds])
 
     @cached_property
-    def _free(self) -> list[NDArray]:
-        """Prices of all shapes where amplitudes cost nothing."""
-        return [np.zeros(len(own)) for own in self.shapes]
+    def _odds(self) -> list[NDArray]:
+        """Expected log odds of each size of each truth, (n, R)."""
+        earlier = self.earlier._odds if self.earlier else None
+        return self._odds_by(Appearance.log_likelihood, earlier)
 
     @cached_property
     def _free_odds(self) -> list[NDArray]:
-        """What T-optimality maximizes: log odds (n, R) of each truth where amplitudes are free."""
-        return self._odds_of_truths(self._free)
+        """What T-optimality maximizes: the same where amplitudes are free."""
+        earlier = self.earlier._free_odds if self.earlier else None
+        return self._odds_by(Appearance.explained, earlier)
 
-    def _odds_of_truths(self, prices: Sequence[NDArray]) -> list[NDArray]:
-        """Return the expected log odds of each size of each truth, (n, R), at some prices."""
+    def _odds_by(
+        self, fit: Callable[[Appearance, NDArray], NDArray], earlier: list[NDArray] | None
+    ) -> list[NDArray]:
+        """Return log odds (n, R) of each truth by some fit, without those of earlier runs."""
         result = []
         for i, truths in enumerate(self.truths):
-            lost = np.array(
-                [
-                    np.min(
-                        [
-                            -0.5 * _squared(truths @ one.span) + price
-                            for one, price in zip(shapes, costs, strict=True)
-                        ],
-                        axis=0,
-                    )
-                    for shapes, costs in zip(self.shapes, prices, strict=True)
-                ]
+            best = np.array(
+                [np.max([fit(one, truths) for one in shapes], axis=0) for shapes in self.shapes]
             ).T
-            result.append(lost - lost[:, i : i + 1])
-        if self.earlier is None:
+            result.append(best[:, i : i + 1] - best)
+        if earlier is None:
             return result
-        return [now - before for now, before in zip(result, self.earlier._free_odds, strict=True)]
+        return [now - before for now, before in zip(result, earlier, strict=True)]
 
     @cached_property
     def _background_covariance(self) -> NDArray:
@@ -211,18 +201,6 @@ class Separation:
             lost = np.logaddexp(0.0, against - mean - np.sqrt(2.0 * mean) * nodes) @ parts
             loss += prior[i] * float(np.delete(lost, i, axis=1).sum(axis=1).mean())
         return loss
-
-    def prices(self, rival: int) -> NDArray:
-        """Return the log likelihood that the amplitudes of each shape of a rival cost, (shapes,).
-
-        Earlier runs have paid for them, but for what further runs know better.
-        """
-        widths = np.array([one.span.shape[1] for one in self.shapes[rival]])
-        if self.earlier is None:
-            return self.price * widths
-        pairs = zip(self.shapes[rival], self.earlier.shapes[rival], strict=True)
-        known_better = np.array([now.log_size - before.log_size for now, before in pairs])
-        return np.clip(known_better, 0.0, self.price * widths)
 
     def separable(self) -> NDArray:
         """Return whether each rival leaves a part of each truth unexplained, (R, R).
@@ -305,7 +283,6 @@ class Separation:
         """
         rng = np.random.default_rng(seed)
         prior = np.log(self._prior)
-        prices = [self.prices(j) for j in range(len(self.rivals))]
         result = np.zeros((len(self.rivals), draws, len(self.rivals)))
         count = self.problem.background.shape[1]
         unknown = np.eye(count)
@@ -318,25 +295,18 @@ class Separation:
             sizes = rng.standard_normal((draws, len(unknown))) @ unknown.T
             y = self.is_planned * (y + sizes @ self.problem.background.T)
             y = own[of_draw] + self.problem.whitened(y.T).T
-            log = self._evidence(y, prices) + prior
+            log = self._evidence(y) + prior
             if self.earlier:
-                known = self.earlier._evidence(self.earlier.truths[i], self.earlier._free)
+                known = self.earlier._evidence(self.earlier.truths[i])
                 log -= known[of_draw]
             result[i] = np.exp(log - logsumexp(log, axis=1, keepdims=True))
         return result
 
-    def _evidence(self, y: NDArray, prices: Sequence[NDArray]) -> NDArray:
+    def _evidence(self, y: NDArray) -> NDArray:
         """Return the log likelihood of each rival, (n, R), over its shapes, in rows (n, rows)."""
         of_rivals = [
-            logsumexp(
-                [
-                    0.5 * _squared(y @ one.span) - price
-                    for one, price in zip(own, costs, strict=True)
-                ],
-                axis=0,
-            )
-            - np.log(len(own))
-            for own, costs in zip(self.shapes, prices, strict=True)
+            logsumexp([one.log_likelihood(y) for one in own], axis=0) - np.log(len(own))
+            for own in self.shapes
         ]
         return np.array(of_rivals).T
 

@@ -34,10 +34,11 @@ class SeparationProblem:
         runs = runs.behind_background(
             runs.diagnosed_problem(effects) if runs.diagnosed else runs.problem(last, effects)
         )
+        bounds = runs.settings.bounds
         if not runs.diagnosed:
-            return cls(tuple(sized(rivals, runs.problem(last, effects))), runs, None)
+            return cls(tuple(sized(rivals, runs.problem(last, effects), bounds)), runs, None)
         problem = runs.diagnosed_problem(effects)
-        own = tuple(sized(rivals, problem))
+        own = tuple(sized(rivals, problem, bounds))
         return cls(own, runs, Separation.of(own, problem, diagnosed=len(problem.runs)))
 
     def with_motion(self, motion: Trajectory, kinds: tuple[str, ...] | None = None) -> Separation:

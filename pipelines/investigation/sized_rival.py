@@ -13,19 +13,24 @@ from numpy.typing import NDArray
 from pipelines.diagnosis.candidates.candidate import Candidate
 from pipelines.diagnosis.criteria import CRITERIA
 from pipelines.diagnosis.detectability.detection_problem import DetectionProblem
-from pipelines.diagnosis.detectability.directions import orthonormal, parts_of, unit_torque
+from pipelines.diagnosis.detectability.directions import parts_of, unit_torque
 from pipelines.diagnosis.detectability.shapes import shapes_of
 from pipelines.diagnosis.selection.prior import FEATURES, weights
 from pipelines.errors import InputError
+from pipelines.investigation.law_shape import LawShape
 from pipelines.investigation.rivals import SETTING, Rival, effects_of
 from pipelines.model import Term
+from pipelines.settings.design import JointBounds
+
+Shape = Candidate | LawShape
+"""A cause of one shape, or an unlisted law."""
 
 
 @dataclass(frozen=True)
 class Truth:
     """A cause of one shape and size."""
 
-    candidate: Candidate
+    candidate: Shape
     factor: float
     """Of the torque at ``linear``; 1 at the size of a shape that transforms the motion."""
     linear: NDArray | None = None
@@ -37,11 +42,12 @@ class Truth:
         Without what the baseline explains, in units of the noise. ``parts`` are those of its
         candidate, if they are known: ``parts_of``.
         """
-        parts = parts_of(self.candidate, problem) if parts is None else parts
-        if self.linear is None:
-            torque = unit_torque(self.candidate, parts, problem)
-        else:
+        parts = parts_in(problem, self.candidate) if parts is None else parts
+        if self.linear is not None:
             torque = [c @ self.linear[:, np.newaxis] for c in parts]
+        else:
+            assert isinstance(self.candidate, Candidate)  # a law has amplitudes
+            torque = unit_torque(self.candidate, parts, problem)
         return self.factor * problem.remainder(torque)[:, 0]
 
 
@@ -52,7 +58,7 @@ class SizedRival:
     rival: Rival
     truths: tuple[Truth, ...]
     """Equally probable if it is the true cause."""
-    shapes: tuple[Candidate, ...]
+    shapes: tuple[Shape, ...]
     """All shapes with which it could explain another cause."""
 
 
@@ -62,25 +68,66 @@ class Appearance:
 
     span: NDArray
     """(rows, k) orthonormal: all that its amplitudes can explain."""
-    log_size: float = 0.0
-    """Half the log determinant of the Gram matrix of its columns: how well amplitudes are known."""
+    sizes: NDArray
+    """(k,) prior standard deviation of the torque along each of them, in units of the noise."""
 
     @classmethod
-    def of(
-        cls, candidate: Candidate, parts: list[NDArray], problem: DetectionProblem
-    ) -> "Appearance":
+    def of(cls, candidate: Shape, parts: list[NDArray], problem: DetectionProblem) -> "Appearance":
         """Compute it for a shape and its parts, (m, O, k) of each planned or recorded run."""
-        if not candidate.transforms_motion:
-            own = candidate.columns_in([run.motion.run for run in problem.runs])
-            parts = [own.expand(c, r) for r, c in enumerate(parts)]
+        if isinstance(candidate, LawShape):
+            parts = [part * candidate.typical(problem) for part in parts]
+        else:
+            if not candidate.transforms_motion:
+                own = candidate.columns_in([run.motion.run for run in problem.runs])
+                parts = [own.expand(c, r) for r, c in enumerate(parts)]
+            parts = _as_shares(parts, problem)
         columns = problem.whitened(problem.remainder(parts))
-        span = orthonormal(columns)
-        sizes = np.linalg.svd(span.T @ columns, compute_uv=False)
-        # An amplitude that does not show is not known at all, and has no size.
-        return cls(span, float(np.log(sizes[sizes > 0.0]).sum()))
+        span, sizes, _ = np.linalg.svd(columns, full_matrices=False)
+        # What is smaller than rounding is no torque.
+        shown = sizes > 1e-8 * sizes.max(initial=0.0)
+        return cls(span[:, shown], sizes[shown])
+
+    def explained(self, rows: NDArray) -> NDArray:
+        """Return the log likelihood (n,) of some rows (n, rows) where amplitudes are free."""
+        return np.asarray(0.5 * np.sum((rows @ self.span) ** 2, axis=1))
+
+    def log_likelihood(self, rows: NDArray) -> NDArray:
+        """Return it where amplitudes are integrated out over their prior (Bishop, 2006, eq. 3.86).
+
+        It is one of noise alone.
+        """
+        squares = self.sizes**2
+        known = squares / (1.0 + squares)
+        return np.asarray(0.5 * (rows @ self.span) ** 2 @ known - 0.5 * np.log1p(squares).sum())
 
 
-def sized(rivals: Sequence[Rival], problem: DetectionProblem) -> list[SizedRival]:
+def _as_shares(parts: list[NDArray], problem: DetectionProblem) -> list[NDArray]:
+    """Return orthogonal torques, (m, O, k) of each run, as large as a diagnosis expects a cause.
+
+    Together they are a usual share of a joint's torque, whatever the units of the amplitudes.
+    """
+    joints = len(problem.torque_rms) // 2
+    shares = [
+        c[:, :joints] / np.maximum(problem.torque_rms[:joints, np.newaxis], 1e-9) for c in parts
+    ]
+    rows = np.concatenate(
+        [c[r.usable[:, :joints]] for r, c in zip(problem.runs, shares, strict=True)]
+    )
+    rows = rows[rows.any(axis=1)]
+    _, sizes, axes = np.linalg.svd(rows, full_matrices=False)
+    shown = sizes > 1e-8 * sizes.max(initial=0.0)
+    units = axes[shown].T / sizes[shown] * np.sqrt(len(rows) / max(shown.sum(), 1))
+    return [float(np.mean(CRITERIA.amplitudes)) * c @ units for c in parts]
+
+
+def parts_in(problem: DetectionProblem, shape: Shape) -> list[NDArray]:
+    """Return the torque of each amplitude of a cause or a law, (m, O, k) of each run."""
+    return shape.parts(problem) if isinstance(shape, LawShape) else parts_of(shape, problem)
+
+
+def sized(
+    rivals: Sequence[Rival], problem: DetectionProblem, bounds: JointBounds
+) -> list[SizedRival]:
     """Return rivals with the shapes and sizes that agree with what is known.
 
     Where nothing is a rival, the torque that runs showed is at most as large as its probability
@@ -91,6 +138,8 @@ def sized(rivals: Sequence[Rival], problem: DetectionProblem) -> list[SizedRival
     rivals : sequence of Rival
     problem : DetectionProblem
         Runs with the last excitation, or a usual one.
+    bounds : JointBounds
+        Of all motions, on which an unlisted law is a function.
 
     Raises
     ------
@@ -104,11 +153,11 @@ def sized(rivals: Sequence[Rival], problem: DetectionProblem) -> list[SizedRival
                 f"{effect.label} cannot show in planned runs, which have no temperatures; give"
                 f" `exoid design {SETTING}` the other causes"
             )
-    nothing = sum(rival.probability for rival in rivals if rival.effect is None)
+    nothing = sum(rival.probability for rival in rivals if rival.is_nothing)
     nothing /= sum(rival.probability for rival in rivals)
     length = _seen_length(nothing, problem) if nothing > 0.0 else None
     seen = _seen(rivals, length, problem)
-    return [_sized(rival, seen, length, problem) for rival in rivals]
+    return [_sized(rival, seen, length, problem, bounds) for rival in rivals]
 
 
 def _seen(
@@ -145,8 +194,15 @@ def _seen_length(nothing: float, problem: DetectionProblem) -> float:
 
 
 def _sized(
-    rival: Rival, seen: NDArray | None, length: float | None, problem: DetectionProblem
+    rival: Rival,
+    seen: NDArray | None,
+    length: float | None,
+    problem: DetectionProblem,
+    bounds: JointBounds,
 ) -> SizedRival:
+    if rival.law and seen is not None:
+        law = LawShape.of(rival.law, problem, bounds)
+        return SizedRival(rival, tuple(_as_seen([law], seen, problem)), (law,))
     if rival.effect is None:
         return SizedRival(rival, (), ())
     grid = list(shapes_of(rival.effect, problem.runs))
@@ -167,15 +223,15 @@ def _sized(
     return SizedRival(rival, tuple(truths), tuple(grid))
 
 
-def _as_seen(grid: Sequence[Candidate], seen: NDArray, problem: DetectionProblem) -> list[Truth]:
+def _as_seen(grid: Sequence[Shape], seen: NDArray, problem: DetectionProblem) -> list[Truth]:
     """Return the shapes that explain a torque (rows,) about as well as the best one does."""
     # Log likelihood by which a shape may be worse: the others have an eighth of its probability.
     tolerance = 2.0
     truths, explained = list[list[Truth]](), list[float]()
     shown = problem.whitened(seen)
     for candidate in grid:
-        columns = problem.whitened(problem.remainder(parts_of(candidate, problem)))
-        gram = columns.T @ columns + np.diag(1.0 / _typical(candidate) ** 2)
+        columns = problem.whitened(problem.remainder(parts_in(problem, candidate)))
+        gram = columns.T @ columns + np.diag(1.0 / _typical(candidate, problem) ** 2)
         if not columns.any():
             continue
         linear = np.linalg.solve(gram, columns.T @ shown)
@@ -186,14 +242,16 @@ def _as_seen(grid: Sequence[Candidate], seen: NDArray, problem: DetectionProblem
     return [one for own, gain in pairs if gain >= best - tolerance for one in own]
 
 
-def _typical(candidate: Candidate) -> NDArray:
+def _typical(candidate: Shape, problem: DetectionProblem) -> NDArray:
     """Return a standard deviation of each amplitude before any data, (k,); two are typical."""
+    if isinstance(candidate, LawShape):
+        return candidate.typical(problem)
     if candidate.transforms_motion:
         return np.ones(1)  # of the size at which the shape is
     return np.array([0.5 * np.max(np.abs(p.typical)) for p in candidate.effect.linear])
 
 
-def _around(candidate: Candidate, linear: NDArray, covariance: NDArray) -> list[Truth]:
+def _around(candidate: Shape, linear: NDArray, covariance: NDArray) -> list[Truth]:
     """Return a candidate at the 2 k cubature points of its amplitudes' distribution.
 
     They have its mean and covariance: amplitudes are only as well known as the runs show them.

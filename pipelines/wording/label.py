@@ -133,7 +133,12 @@ def in_words(effect: Effect) -> str:
 
 
 def label_in_words(label: str, machine: Machine | None = None) -> str:
-    """Return the wording of a cause or an unlisted law; a machine's sliding joints have forces."""
+    """Return the wording of a cause, an unlisted law, or nothing.
+
+    A machine's sliding joints have forces.
+    """
+    if label == NOTHING:
+        return NOTHING
     return (
         law_in_words(label, machine) if label.startswith(LAW) else in_words(effect_labelled(label))
     )

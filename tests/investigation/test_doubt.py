@@ -53,10 +53,28 @@ def test_a_dropped_cause_is_no_rival(doubt):
     assert "parallel_spring@knee" not in doubt(change).probabilities
 
 
-def test_where_a_law_has_the_rest_no_motion_can_be_planned(doubt):
+def test_an_unlisted_law_of_the_motion_is_a_rival(doubt):
     found = doubt(ties=(), nothing=0.01, law=0.2)
+    assert found.state is State.OPEN
+    assert set(found.probabilities) == {"cogging@knee", "law:angle@knee"}
+    assert "a law of the knee's angle" in found.words
+
+
+@pytest.mark.parametrize("law", ["law:time@knee", "law:hum@knee", "law:unlisted_angle@knee"])
+def test_a_law_that_no_motion_shows_better_is_no_rival(doubt, law):
+    def change(document):
+        document["posterior"]["laws"] = {law: 0.2}
+
+    found = doubt(change, ties=(), nothing=0.01, law=0.2)
     assert found.state is State.UNLISTED
     assert "unlisted law" in found.words
+
+
+def test_a_law_beside_a_cause_is_no_rival_of_it(doubt):
+    def change(document):
+        document["posterior"]["laws"] = {"law:angle@knee": 0.9}
+
+    assert "law:angle@knee" not in doubt(change).probabilities
 
 
 def test_nothing_is_decided_unless_a_cause_is_close(doubt):

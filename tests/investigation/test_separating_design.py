@@ -60,12 +60,9 @@ def test_the_expected_log_odds_are_the_mean_of_simulated_log_likelihoods(usual):
     rng = np.random.default_rng(1)
     rows = true + rng.standard_normal((5000, len(true)))
 
-    def log_likelihood(span):
-        # Each amplitude fits half a unit of noise, and costs its price.
-        width = span.shape[1]
-        return 0.5 * (np.sum((rows @ span) ** 2, axis=1) - width) - found.price * width
-
-    odds = log_likelihood(spring.span) - log_likelihood(inertia.span)
+    # Each amplitude fits half a unit of noise.
+    noise = [0.5 * (one.sizes**2 / (1.0 + one.sizes**2)).sum() for one in (spring, inertia)]
+    odds = spring.log_likelihood(rows) - inertia.log_likelihood(rows) - noise[0] + noise[1]
     error = float(np.std(odds)) / np.sqrt(len(odds))
     assert 2.0 < true @ true < 20.0
     assert found.log_odds()[0, 1] == pytest.approx(np.mean(odds), abs=4.0 * error + 0.05)
@@ -183,7 +180,7 @@ def test_a_tie_of_a_fitted_cause_makes_its_torque(usual):
     asymmetry, offset = named("coulomb_asymmetry@hip", "torque_offset@hip")
     fitted = Rival(asymmetry.effect, 0.6, Term(asymmetry.effect, np.array([-2.0])))
     problem = RUNS.problem(usual, [fitted.effect, offset.effect])
-    own, other = (one.truths for one in sized([fitted, offset], problem))
+    own, other = (one.truths for one in sized([fitted, offset], problem, QUICK.bounds))
     assert np.mean([one.linear for one in own]) == pytest.approx(-2.0, rel=0.05)
     assert mean_of(other, problem) == pytest.approx(mean_of(own, problem), rel=0.01, abs=0.01)
 
@@ -193,7 +190,7 @@ def test_a_tie_may_be_a_part_of_the_fitted_cause(usual):
     spring, offset = named("parallel_spring@knee", "torque_offset@knee")
     fitted = Rival(spring.effect, 0.6, Term(spring.effect, np.array([0.0, 3.0])))
     problem = RUNS.problem(usual, [fitted.effect, offset.effect])
-    _, other = (one.truths for one in sized([fitted, offset], problem))
+    _, other = (one.truths for one in sized([fitted, offset], problem, QUICK.bounds))
     assert abs(np.mean([one.linear for one in other])) == pytest.approx(3.0, rel=0.05)
 
 
@@ -201,7 +198,7 @@ def test_an_amplitude_is_as_well_known_as_the_runs_show_it(usual):
     spring = named(*EASY)[0]
     problem = RUNS.problem(usual, [spring.effect])
     fitted = Rival(spring.effect, 1.0, Term(spring.effect, np.array([7.0, 2.0])))
-    truths = sized([fitted], problem)[0].truths
+    truths = sized([fitted], problem, QUICK.bounds)[0].truths
     linear = np.array([one.linear for one in truths])
     units = [Truth(truths[0].candidate, 1.0, one).torque(problem) for one in np.eye(2)]
     known = np.linalg.inv(np.array(units) @ np.transpose(units) + np.diag([20.0**-2, 15.0**-2]))
@@ -215,7 +212,9 @@ def test_what_is_hardly_seen_is_small(usual):
     def length(nothing):
         rivals = [Rival(spring.effect, 1.0 - nothing, large), Rival(None, nothing)]
         problem = RUNS.problem(usual, [spring.effect])
-        return float(np.linalg.norm(sized(rivals, problem)[0].truths[0].torque(problem)))
+        return float(
+            np.linalg.norm(sized(rivals, problem, QUICK.bounds)[0].truths[0].torque(problem))
+        )
 
     assert length(0.8) < length(0.5) < length(0.1) < length(1e-9)
 
