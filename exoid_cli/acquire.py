@@ -153,6 +153,7 @@ def _record(
 ) -> None:
     from pipelines.acquisition.acquire import acquire as record
     from pipelines.acquisition.preconditions.human_interlock import unmonitored
+    from pipelines.design.lines import cut_periods
     from pipelines.workflow.imported import refuse_imported, refuse_recorded
 
     def claim() -> None:
@@ -171,6 +172,8 @@ def _record(
     with ExitStack() as starting, ExitStack() as view:
 
         def begin(rig: "RigSettings", motion: "Trajectory") -> None:
+            for warning in cut_periods([settings], motion):
+                console.warn(warning)
             if settings.run == "with_human" and not rig.embedded:
                 for warning in unmonitored(rig):
                     console.warn(warning)

@@ -7,6 +7,7 @@ import typer
 
 from exoid_cli.console import console
 from exoid_cli.excitation import (
+    criterion_text,
     excitations,
     planned_geometry,
     show_quality,
@@ -49,11 +50,11 @@ def design(
         ),
     ] = None,
     criterion: Annotated[
-        Literal["log_det", "condition", "scaled_condition"] | None,
+        Literal["log_det", "condition", "scaled_condition", "multisine"] | None,
         typer.Option(help="Overrides exoid.toml's."),
     ] = None,
     harmonics: Annotated[
-        int | None, typer.Option(min=1, max=20, help="Overrides exoid.toml's.")
+        int | None, typer.Option(min=1, max=100, help="Overrides exoid.toml's.")
     ] = None,
     seed: Annotated[int | None, typer.Option(min=0, help="Overrides exoid.toml's.")] = None,
     again: AgainOption = False,
@@ -102,7 +103,9 @@ def design(
         if evaluate:
             _evaluate(evaluate, settings, geometry)
         elif output:
-            _design(output, settings, geometry, mechanism)
+            # The other runs follow excitations of their own.
+            runs = [run for run in experiment.run if run.trajectory is None]
+            _design(output, settings, geometry, mechanism, runs)
         return
     if sizes:
         wanted = sizes_of(causes or (), experiment, settings)
@@ -126,20 +129,31 @@ def _evaluate(file: Path, settings: Any, geometry: Any) -> None:
     result = quality(read_trajectory(file), settings, geometry)
     console.emit({"file": str(file), **result.as_metadata()})
     show_quality(str(file), result)
-    console.say(f"\n{file}: {settings.criterion} {result.value(settings.criterion):.4g}")
+    console.say(f"\n{file}: {criterion_text(settings, result)}")
 
 
-def _design(output: Path, settings: Any, geometry: Any, mechanism: dict[str, Any]) -> None:
+def _design(
+    output: Path, settings: Any, geometry: Any, mechanism: dict[str, Any], runs: list[Any]
+) -> None:
     from pipelines.design.excitation import design
+    from pipelines.design.lines import cut_periods
 
     with console.progress("designing", total=1.0) as report:
         result = design(settings, geometry, report)
     write_excitation(output, result, result.metadata(), geometry, mechanism)
     warn_of_cut(result)
+    for warning in cut_periods(runs, result.trajectory):
+        console.warn(warning)
     console.emit({"file": str(output), **result.metadata()})
     show_quality(str(output), result.quality)
+    harmonics = f"{settings.harmonics} harmonics"
+    if empty := result.detection_lines:
+        odd = sum(line % 2 for line in empty)
+        harmonics = (
+            f"{settings.harmonics - len(empty)} odd harmonics up to {settings.harmonics}, {odd} odd"
+            f" and {len(empty) - odd} even detection lines"
+        )
     console.say(
-        f"\n{output}: {settings.criterion} {result.quality.value(settings.criterion):.4g},"
-        f" {settings.harmonics} harmonics, period {result.trajectory.period_s:g} s, seed"
-        f" {settings.seed}; stopped by {result.stopped_by}"
+        f"\n{output}: {criterion_text(settings, result.quality)}, {harmonics}, period"
+        f" {result.trajectory.period_s:g} s, seed {settings.seed}; stopped by {result.stopped_by}"
     )

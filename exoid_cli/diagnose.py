@@ -64,7 +64,7 @@ def diagnose(
     from pipelines.contracts.atomic import folder_to_fill
     from pipelines.contracts.verdict import check
     from pipelines.diagnosis.diagnose import diagnose as find
-    from pipelines.diagnosis.verdict.figures import FIGURES
+    from pipelines.diagnosis.verdict.figures import FIGURES, WITH_DETECTION_LINES
     from pipelines.diagnosis.verdict.verdict import verdict
     from pipelines.mechanics.read import geometry_from, read_motions, refuse_another_mechanism
 
@@ -84,6 +84,7 @@ def diagnose(
     with folder_to_fill(output), console.progress("diagnosing", 1.0) as report:
         diagnosis = find(motions, report, chosen.known, chosen.accept)
     document = verdict(diagnosis)
+    drawn = [*FIGURES, *([WITH_DETECTION_LINES] if diagnosis.detection_lines else [])]
     # Checked before anything is written, so that a verdict on disk is always a valid one.
     checked = check(document, str(output / "verdict.json"))
     _write(output, diagnosis, document, checked if figures else None, motions, files, settings)
@@ -94,7 +95,7 @@ def diagnose(
         "verdict.json",
         *(f"{name}.parquet" for name in _tables()),
         "detectability.json",
-        *(f"{name}.png" for name in FIGURES if figures),
+        *(f"{name}.png" for name in drawn if figures),
     )
 
 
@@ -177,8 +178,9 @@ def _about_model(
 
 def _remove_old_figures(output: Path, written: Collection[str]) -> None:
     """Remove the figures of an earlier diagnosis, which would contradict the new verdict."""
-    from pipelines.diagnosis.verdict.figures import FIGURES
+    from pipelines.diagnosis.verdict.figures import FIGURES, WITH_DETECTION_LINES
 
-    for old in (f"{name}.{kind}" for name in FIGURES for kind in ("png", "pdf")):
+    names = (*FIGURES, WITH_DETECTION_LINES)
+    for old in (f"{name}.{kind}" for name in names for kind in ("png", "pdf")):
         if old not in written:
             (output / old).unlink(missing_ok=True)

@@ -81,6 +81,12 @@ def warn_of_cut(design: "Design") -> None:
         )
 
 
+def criterion_text(settings: Any, quality: "Quality") -> str:
+    """Return the criterion of the settings and its value."""
+    name = "crest factor" if settings.criterion == "multisine" else settings.criterion
+    return f"{name} {quality.value(settings.criterion):.4g}"
+
+
 def show_quality(file: str, quality: "Quality") -> None:
     """Show what can be identified with an excitation, and the margins to its limits."""
     conditioning = [

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from exoid_cli.console import console
 from exoid_cli.excitation import (
+    criterion_text,
     excitations,
     planned_geometry,
     show_quality,
@@ -108,7 +109,7 @@ def evaluate_separation(file: Path, settings: Any, geometry: Any, question: Ques
     console.emit({"file": str(file), **result.as_metadata(), **document})
     show_quality(str(file), result)
     show_separation(f"With {file}", separated)
-    console.say(f"\n{file}: {settings.criterion} {result.value(settings.criterion):.4g}")
+    console.say(f"\n{file}: {criterion_text(settings, result)}")
 
 
 def design_separation(

@@ -22,6 +22,7 @@ def show_verdict(verdict: "Verdict", joints: "Sequence[Joint]") -> None:
     for caveat in verdict.caveats:
         console.say(f"\nBut {caveat}.")
     _show_router(verdict)
+    _show_detection_lines(verdict)
     _show_errors(verdict, joints)
     for known in verdict.known:
         console.say(f"\n{known.label}, assumed present")
@@ -113,6 +114,17 @@ def _show_router(verdict: "Verdict") -> None:
         f"{_listed(parts.values())}: parts of the mean square, {searched_runs(verdict)}. "
         f"{_listed(variables)}: share that a curve of it alone predicts, validation runs."
     )
+
+
+def _show_detection_lines(verdict: "Verdict") -> None:
+    """Print what the lines show that the motion leaves empty."""
+    from pipelines.wording.detection_lines import HEADINGS, notes, rows
+
+    if verdict.detection_lines:
+        title = "what repeats at the lines of the motion, and at those that it leaves empty"
+        _show_table(title, HEADINGS, rows(verdict))
+        for note in notes(verdict):
+            console.note(note)
 
 
 def _listed(words: Iterable[str]) -> str:

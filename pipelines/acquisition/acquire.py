@@ -33,6 +33,7 @@ from pipelines.contracts.atomic import open_folder
 from pipelines.contracts.provenance import describe
 from pipelines.contracts.run_paths import journal_of
 from pipelines.errors import DeviceError, about
+from pipelines.mechanics.fourier import FourierTrajectory
 from pipelines.mechanics.trajectory import Trajectory, read_trajectory
 from pipelines.process.priority import urgent
 from pipelines.settings.acquire import RunSettings
@@ -239,4 +240,6 @@ def _metadata(
     }
     if trajectory.period_s:
         metadata["period_s"] = trajectory.period_s
+    if isinstance(trajectory, FourierTrajectory) and trajectory.has_detection_lines:
+        metadata["excited_lines"] = trajectory.excited_lines
     return metadata

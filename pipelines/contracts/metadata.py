@@ -112,6 +112,9 @@ class RunKeys(TableKeys):
     purpose: Literal["train", "validate"]
     sample_rate_hz: Positive
     period_s: Positive | None = None
+    # Numbers of the harmonics of 1/period_s that the motion excites, where detection lines are left
+    # empty: all are odd, and every other harmonic is a detection line.
+    excited_lines: Annotated[list[Annotated[int, Field(gt=0)]], Field(min_length=1)] | None = None
     rig: str | None = None
     subject: str | None = None
     session: str | None = None

@@ -1,8 +1,8 @@
 """``trajectory/1``: an excitation, sampled, with its Fourier coefficients."""
 
-from typing import Self
+from typing import Annotated, Self
 
-from pydantic import model_validator
+from pydantic import Field, model_validator
 
 from pipelines.contracts.metadata import Finite, Matrix, Positive, TableKeys
 from pipelines.contracts.table import Column, Contract, per_joint
@@ -21,6 +21,9 @@ class TrajectoryKeys(TableKeys):
     condition: Positive | None = None
     scaled_condition: Positive | None = None
     log_det: Finite | None = None
+    crest_factor: Positive | None = None
+    # Harmonics left empty, at which noise and distortion are measured; most excitations lack it.
+    detection_lines: list[Annotated[int, Field(gt=0)]] | None = None
     seed: int | None = None
 
     @model_validator(mode="after")

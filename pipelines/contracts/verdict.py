@@ -160,6 +160,33 @@ class Shares(_Object):
     with_person_only: Number | None
 
 
+class LineClasses(_Object):
+    """A number for each class of lines."""
+
+    excited: Number
+    odd: Number
+    even: Number
+
+
+class DetectionLines(_Object):
+    """Noise and distortion of one joint's torque, from the lines that the motion leaves empty."""
+
+    runs: int
+    periods: int
+    highest_hz: Number
+    noise_nm: Number
+    measured_nm: LineClasses
+    predicted_nm: LineClasses
+    residual_nm: LineClasses
+    p_value: LineClasses
+    extended_residual_nm: LineClasses | None = None
+    """With the named causes; None without any."""
+    extended_p_value: LineClasses | None = None
+    change_nm: Number | None = None
+    """None without a run of three periods."""
+    change_p_value: Number | None = None
+
+
 class Posterior(_Object):
     """Probabilities after all sets of causes and unlisted laws were weighed."""
 
@@ -270,6 +297,8 @@ class Verdict(_Object):
     fitted_to: Literal["train", "all"] = "train"
     """The runs to which the models are fitted; files of older versions lack it."""
     router: dict[str, Shares] = {}
+    detection_lines: dict[str, DetectionLines] = {}
+    """By joint; files of older versions and those of other motions lack it."""
     posterior: Posterior | None = None
     """None if acquisition is at fault."""
     caveats: list[str]
@@ -314,6 +343,7 @@ class Verdict(_Object):
             f"causes[{k}].gain.joint": one.gain.joint for k, one in enumerate(self.causes)
         }
         named |= {f"findings[{k}].joint": one.joint for k, one in enumerate(self.findings)}
+        named |= {f"detection_lines.{joint}": joint for joint in self.detection_lines}
         for key, joint in named.items():
             if joint is not None and joint not in joints:
                 raise ValueError(f"{key} is {joint!r}, no joint of noise_floor_nm")

@@ -7,6 +7,8 @@ import numpy as np
 import pandas as pd
 
 from pipelines.contracts.joints import columns_of
+from pipelines.design.lines import detection_lines
+from pipelines.design.multisine import multisine
 from pipelines.design.quality import Quality, quality
 from pipelines.design.search import Report, search
 from pipelines.mechanics.fourier import FourierTrajectory
@@ -23,6 +25,11 @@ class Design:
     quality: Quality
     settings: DesignSettings
     stopped_by: str
+
+    @property
+    def detection_lines(self) -> list[int]:
+        """Harmonics left empty to measure noise and distortion at; none in most excitations."""
+        return detection_lines(self.trajectory)
 
     def frame(self) -> pd.DataFrame:
         """Return one period as rows of a ``trajectory/1`` table.
@@ -46,6 +53,7 @@ class Design:
             "b": self.trajectory.b.tolist(),
             "criterion": self.settings.criterion,
             "criterion_value": self.quality.value(self.settings.criterion),
+            **({"detection_lines": self.detection_lines} if self.detection_lines else {}),
             **self.quality.as_metadata(),
             "seed": self.settings.seed,
             "stopped_by": self.stopped_by,
@@ -76,5 +84,6 @@ def design(
         The best excitation and its quality.
     """
     geometry = geometry or Geometry()
-    trajectory, stopped_by = search(settings, geometry, report)
+    find = multisine if settings.criterion == "multisine" else search
+    trajectory, stopped_by = find(settings, geometry, report)
     return Design(trajectory, quality(trajectory, settings, geometry), settings, stopped_by)

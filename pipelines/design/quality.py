@@ -10,13 +10,13 @@ from scipy.signal import lfilter
 from pipelines.errors import InputError
 from pipelines.estimation.regression import away_from_reversals
 from pipelines.mechanics.geometry import Geometry
-from pipelines.mechanics.limits import Margin, margins
+from pipelines.mechanics.limits import Margin, bounds_array, margins
 from pipelines.mechanics.machine import THE_LEG
 from pipelines.mechanics.mechanisms.leg import LEG
 from pipelines.mechanics.motion import Motion
 from pipelines.mechanics.trajectory import Trajectory
 from pipelines.model import Model, baseline
-from pipelines.settings.design import DesignSettings, NoiseSettings
+from pipelines.settings.design import DesignSettings, JointBounds, NoiseSettings
 
 
 @dataclass(frozen=True)
@@ -34,6 +34,9 @@ class Quality:
     """Condition number with columns of unit norm, independent of units."""
     log_det: float
     """log det of A'A/N."""
+    crest_factor: float
+    """Largest peak of angle, velocity and acceleration over their largest rms, of the joint where
+    it is larger; peaks and rms as shares of the bounds."""
     standard_errors: dict[str, float]
     """Expected standard error of each parameter, in its unit."""
     units: dict[str, str]
@@ -41,11 +44,11 @@ class Quality:
 
     def value(self, criterion: str) -> float:
         """Return the value of a criterion."""
-        return float(getattr(self, criterion))
+        return float(getattr(self, "crest_factor" if criterion == "multisine" else criterion))
 
     def as_metadata(self) -> dict[str, Any]:
         """Return the quality for the metadata of ``trajectory/1``."""
-        names = ("condition", "scaled_condition", "log_det", "inertial_condition")
+        names = ("condition", "scaled_condition", "log_det", "inertial_condition", "crest_factor")
         return {
             **_finite({name: getattr(self, name) for name in names}),
             "standard_errors": _finite(self.standard_errors),
@@ -83,10 +86,38 @@ def quality(trajectory: Trajectory, settings: DesignSettings, geometry: Geometry
         # A joint at rest has a column of zeros, which stays zero: the condition is infinite.
         scaled_condition=_condition(stacked / np.where(size > 0.0, size, 1.0)),
         log_det=float(np.linalg.slogdet(stacked.T @ stacked / samples)[1]),
+        crest_factor=crest_factor(trajectory, settings.bounds),
         standard_errors=dict(zip(parameters, errors.tolist(), strict=True)),
         units=parameters,
         margins=margins(trajectory, settings.bounds),
     )
+
+
+def crest_factor(trajectory: Trajectory, bounds: JointBounds) -> float:
+    """Return the largest peak of a motion over its largest rms, both as shares of the bounds.
+
+    Where one quantity is limiting, it is that quantity's crest factor, 1.41 for a sine. A low one
+    means much power within the bounds.
+
+    Parameters
+    ----------
+    trajectory : Trajectory
+        Motion of hip and knee.
+    bounds : JointBounds
+        Limits of hip and knee.
+
+    Returns
+    -------
+    float
+        Of the joint where it is larger; NaN if a joint is at rest.
+    """
+    span, samples = trajectory.period_s or trajectory.duration_s, 1000
+    states = np.array(trajectory.at(np.arange(samples) * span / samples))
+    half = 0.5 * np.ptp(bounds_array(bounds), axis=2)
+    rms = states.std(axis=1) / half
+    peak = 0.5 * np.ptp(trajectory.extrema(), axis=2) / half
+    with np.errstate(invalid="ignore"):
+        return float(np.max(peak.max(axis=0) / rms.max(axis=0)))
 
 
 def regressor(trajectory: Trajectory, geometry: Geometry, time: NDArray) -> NDArray:

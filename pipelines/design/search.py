@@ -9,6 +9,7 @@ from scipy.linalg import null_space
 
 from pipelines.design.evolution import polish
 from pipelines.design.fitness import Problem, costs, expand, problem
+from pipelines.design.lines import excited_lines
 from pipelines.design.swarm import Swarm, fly
 from pipelines.errors import NotIdentifiable
 from pipelines.mechanics.fourier import FourierTrajectory
@@ -107,13 +108,23 @@ def search_problem(
         harmonics=settings.harmonics,
         bounds=bounds_array(settings.bounds),
         geometry=geometry,
-        criterion=settings.criterion,
+        # A multisine has no search of its own over its coefficients.
+        criterion="log_det" if settings.criterion == "multisine" else settings.criterion,
         theta0=None if settings.theta0_rad == "free" else np.array(settings.theta0_rad),
-        basis=basis_of(settings.harmonics, settings.rest_to_rest),
+        basis=_basis(settings),
         # The bound between samples costs 0.3 % of the amplitude at 40 samples per harmonic. At 100
         # it costs 0.05 %.
         samples=max(samples, samples_per_harmonic * settings.harmonics),
     )
+
+
+def _basis(settings: DesignSettings) -> NDArray:
+    """Return the basis of the coefficients that the settings allow, (2, n, free)."""
+    if settings.criterion != "multisine":
+        return basis_of(settings.harmonics, settings.rest_to_rest)
+    # A further experiment has the same detection lines as the designed one.
+    lines = excited_lines(settings.harmonics, settings.seed)
+    return np.array([np.eye(settings.harmonics)[:, lines - 1]] * 2)
 
 
 def basis_of(harmonics: int, rest_to_rest: bool) -> NDArray:

@@ -10,12 +10,19 @@ from numpy.typing import NDArray
 
 from pipelines.diagnosis.criteria import CRITERIA
 from pipelines.diagnosis.evidence.baseline import Baseline
+from pipelines.diagnosis.evidence.detection_lines import (
+    JointDetectionLines,
+    LineSpectrum,
+    detection_lines,
+    line_spectrum,
+)
 from pipelines.diagnosis.evidence.model_error import imperfection
 from pipelines.diagnosis.evidence.noise_floor import Floor
 from pipelines.diagnosis.evidence.noise_model import NoiseModel
 from pipelines.diagnosis.evidence.observed_run import Run
 from pipelines.diagnosis.fit import parameter_rows
 from pipelines.diagnosis.fit.fitted_model import values_of_each_run
+from pipelines.diagnosis.fit.joint_fit import residuals_on
 from pipelines.diagnosis.fit.presliding_test import BuildUp, built_up
 from pipelines.diagnosis.fit.simulation_error import simulation_error
 from pipelines.diagnosis.fit.uncertainty import Uncertainty, uncertainty
@@ -229,6 +236,33 @@ class Diagnosis:
         """The gain of each named cause on the validation runs, the others kept, by label."""
         after = self.after.errors
         return {label: gain(less.errors, after) for label, less in self.without.items()}
+
+    @cached_property
+    def detection_lines(self) -> dict[str, JointDetectionLines]:
+        """What detection lines show at each joint; empty for motions without them."""
+        if self.data.spoilt:
+            return {}
+        joints = zip(self.baseline.joints, detection_lines(*self._all_residuals()), strict=True)
+        return {joint: lines for joint, lines in joints if lines is not None}
+
+    def line_spectrum(self, joint: str) -> LineSpectrum | None:
+        """Return the spectrum of a joint's torque; None for motions without detection lines."""
+        runs, residuals, _ = self._all_residuals()
+        return line_spectrum(runs, residuals, self.baseline.joints.index(joint))
+
+    def _all_residuals(self) -> tuple[list[Run], list[NDArray], list[NDArray] | None]:
+        """Return the fitted and the validation runs, with both models' residuals (m, O) N·m.
+
+        The latter is None without causes.
+        """
+        runs, others = list(self.fitted_runs), () if self.fitted_to_all else self.validate
+
+        def residuals(result: ValidationResult) -> list[NDArray]:
+            scored = () if self.fitted_to_all else result.residuals
+            return [*residuals_on(result.fit, runs, self.baseline), *scored]
+
+        extended = residuals(self.after) if self.named else None
+        return [*runs, *others], residuals(self.before), extended
 
     @cached_property
     def torque_rms(self) -> NDArray:

@@ -61,7 +61,9 @@ def polished_search(
         Of the last experiment: where the search can reach it, its result is no worse.
     """
     rng = np.random.default_rng(settings.seed)
-    by_log_det = settings.model_copy(update={"criterion": "log_det"})
+    # Repair and start are by log det. Settings of a multisine do that too, on its lines alone.
+    on_lines = settings.criterion == "multisine"
+    by_log_det = settings if on_lines else settings.model_copy(update={"criterion": "log_det"})
     problem = search_problem(by_log_det, geometry, samples=200, samples_per_harmonic=40)
     search = _Search(problem, cost, report, time.monotonic() + settings.seconds)
     swarm = first_swarm(settings, problem, spread_of(problem), rng)

@@ -67,6 +67,21 @@ class FourierTrajectory:
         return ranges
 
     @property
+    def excited_lines(self) -> list[int]:
+        """Numbers of the harmonics that any joint moves at."""
+        size = np.hypot(self.a, self.b).max(axis=0)
+        # Coefficients of a file may be rounded, but an empty line is exactly zero in any.
+        return [int(k) for k in np.flatnonzero(size > 0.0) + 1]
+
+    @property
+    def has_detection_lines(self) -> bool:
+        """Whether all even harmonics, and some odd ones below the highest, are empty."""
+        excited = self.excited_lines
+        if not excited or any(k % 2 == 0 for k in excited):
+            return False
+        return len(excited) < len(range(1, self.a.shape[1] + 1, 2))
+
+    @property
     def _frequencies(self) -> NDArray:
         return self.omega * np.arange(1, self.a.shape[1] + 1)
 

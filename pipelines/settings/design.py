@@ -53,12 +53,16 @@ class DesignSettings(Settings):
 
     # Its inverse is the period, after which the excitation repeats.
     base_frequency_hz: Positive = Field(0.1, description="Frequency of the first harmonic.")
-    harmonics: int = Field(5, ge=1, le=20, description="How many harmonics each joint has.")
+    harmonics: int = Field(
+        5, ge=1, le=100, description="The highest harmonic; at most 20 except of a multisine."
+    )
     theta0_rad: Literal["free"] | tuple[float, float] = Field(
         "free", description='Mean angle of hip and knee, or "free" to search it too.'
     )
-    criterion: Literal["log_det", "condition", "scaled_condition"] = Field(
-        "log_det", description="log det of A'A/N, or condition number, raw or of scaled columns."
+    criterion: Literal["log_det", "condition", "scaled_condition", "multisine"] = Field(
+        "log_det",
+        description="log det of A'A/N, or condition number, raw or of scaled columns; or"
+        " odd harmonics with detection lines left empty.",
     )
     rest_to_rest: bool = Field(False, description="Start and end at standstill.")
     bounds: JointBounds = Field(JointBounds(), description="Of angle, speed and acceleration.")
@@ -83,6 +87,30 @@ class DesignSettings(Settings):
                     f"theta0_rad: found {theta0} at the {name}, expected between its bounds {low}"
                     f' and {high}; change one of them, or write "free"'
                 )
+        return self
+
+    @model_validator(mode="after")
+    def _harmonics_suit_the_criterion(self) -> Self:
+        most_searched, least_of_multisine = 20, 5
+        if self.criterion != "multisine" and self.harmonics > most_searched:
+            raise ValueError(
+                f"harmonics: found {self.harmonics}, expected at most {most_searched} with"
+                f' criterion = "{self.criterion}"; lower it, or set criterion = "multisine"'
+            )
+        if self.criterion == "multisine" and self.harmonics < least_of_multisine:
+            raise ValueError(
+                f"harmonics: found {self.harmonics}, expected at least {least_of_multisine} with"
+                ' criterion = "multisine"; fewer leave no odd harmonic empty'
+            )
+        return self
+
+    @model_validator(mode="after")
+    def _multisine_is_never_at_rest(self) -> Self:
+        if self.rest_to_rest and self.criterion == "multisine":
+            raise ValueError(
+                "rest_to_rest: a multisine of fixed amplitudes is never at rest; set it to false,"
+                " or choose another criterion"
+            )
         return self
 
     @model_validator(mode="after")

@@ -38,6 +38,15 @@ def test_every_sample_of_the_run_is_there_and_tells_its_time(record):
     assert table.metadata["period_s"] == pytest.approx(1.0)
 
 
+def test_a_recording_names_the_excited_lines_of_a_motion_with_detection_lines(record, excitation):
+    assert "excited_lines" not in record().metadata
+    excitation.write_text(
+        'unit = "deg"\nomega_rad_s = 6.283185307179586\ntheta0_rad = [0.65, -0.93]\n'
+        "a = [[5, 0, 0, 0, 1], [6, 0, 0, 0, 0]]\nb = [[0, 0, 0, 0, 0], [0, 0, 0, 0, 1]]\n"
+    )
+    assert record().metadata["excited_lines"] == [1, 5]
+
+
 def test_a_signal_that_comes_too_late_to_stop_a_run_lets_no_other_begin(
     record, monkeypatch, tmp_path
 ):

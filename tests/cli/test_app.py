@@ -294,8 +294,8 @@ def test_a_fault_of_exoid_keeps_its_traceback_in_a_file(exoid, monkeypatch, tmp_
         (
             ["design", "--criterion", "logdet"],
             (
-                "exoid: --criterion: found logdet, expected log_det, condition, scaled_condition;"
-                " did you mean log_det?\n"
+                "exoid: --criterion: found logdet, expected log_det, condition, scaled_condition,"
+                " multisine; did you mean log_det?\n"
             ),
         ),
         (

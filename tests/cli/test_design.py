@@ -69,6 +69,28 @@ def test_a_design_is_written_with_what_it_is_worth(tmp_path, config, capsys):
     assert json.loads(capsys.readouterr().out)["log_det"] == pytest.approx(result["log_det"])
 
 
+def test_a_multisine_says_how_many_lines_it_has_and_which_runs_cut_a_period(tmp_path, capsys):
+    config, out = tmp_path / "exoid.toml", tmp_path / "t.parquet"
+    runs = "".join(
+        f'[[run]]\nname = "{name}"\nrun = "exo_alone"\npurpose = "train"\nduration_s = {seconds}\n'
+        for name, seconds in (("cut", 30.0), ("whole", 40.0))
+    )
+    config.write_text(
+        f'[design]\ncriterion = "multisine"\nharmonics = 12\nbase_frequency_hz = 0.05\n{runs}'
+    )
+    assert run(["design", "--config", str(config), "-o", str(out)]) == 0
+    captured = capsys.readouterr()
+    value = TRAJECTORY.read(out).metadata["criterion_value"]
+    assert " ".join(captured.out.split()).endswith(
+        f"{out}: crest factor {value:.4g}, 4 odd harmonics up to 12, 2 odd and 6 even detection"
+        " lines, period 20 s, seed 1; stopped by stagnation"
+    )
+    assert "run cut lasts 30 s, 1.5 periods" in " ".join(captured.err.split())
+    assert "run whole" not in captured.err
+    assert run(["design", "--config", str(config), "--evaluate", str(out)]) == 0
+    assert f"crest factor {value:.4g}" in capsys.readouterr().out
+
+
 def test_options_win_over_the_file(tmp_path, config):
     out = tmp_path / "t.parquet"
     options = ["--seed", "9", "--harmonics", "3", "--criterion", "condition"]

@@ -48,6 +48,22 @@ HOLES = {
 }
 
 
+def lines_of(joint):
+    """Return the key of what detection lines show at one joint."""
+    numbers = {"excited": 1.0, "odd": 0.2, "even": 0.1}
+    keys = ("measured_nm", "predicted_nm", "residual_nm", "p_value")
+    about = {"runs": 4, "periods": 8, "highest_hz": 12.5, "noise_nm": 0.3}
+    return {"detection_lines": {joint: about | dict.fromkeys(keys, numbers)}}
+
+
+def test_a_verdict_may_have_detection_lines_of_its_joints_alone():
+    checked = verdict.check(verdict_of(**decision_of(), **lines_of("knee")), "new")
+    assert checked.detection_lines["knee"].p_value.odd == 0.2
+    assert verdict.check(verdict_of(), "older").detection_lines == {}
+    with pytest.raises(ContractError, match=r"detection_lines\.ankle is 'ankle', no joint"):
+        verdict.check(verdict_of(**decision_of(), **lines_of("ankle")), "new")
+
+
 @pytest.mark.parametrize("joints", [LEG, AXIS])
 def test_a_whole_verdict_is_read_as_it_stands(tmp_path, joints):
     path = tmp_path / "verdict.json"

@@ -98,7 +98,8 @@ def test_every_key_of_a_rig_file_has_a_description():
         ),
         (
             "[design]\ncriterion = 'best'\n",
-            "design.criterion: found 'best', expected 'log_det', 'condition' or 'scaled_condition'",
+            "design.criterion: found 'best', expected 'log_det', 'condition',"
+            " 'scaled_condition' or 'multisine'",
         ),
         (
             "[design.bounds.hip]\nangle_rad = [1.0, 0.5]\n",

@@ -45,6 +45,7 @@ def verdict(d: Diagnosis) -> dict[str, Any]:
             for joint, shares in zip(joints, d.selected.router, strict=True)
             if joint.is_measured
         },
+        **_detection_lines(d),
         "posterior": _posterior(d),
         "acquisition_at_fault": bool(d.data.spoilt),
         "caveats": caveats(d),
@@ -84,6 +85,12 @@ def verdict(d: Diagnosis) -> dict[str, Any]:
         "runs": sorted({run.motion.run for run in d.validate}),
         "noise_floor_from": floor_from(d),
     }
+
+
+def _detection_lines(d: Diagnosis) -> dict[str, Any]:
+    """Return the key of what detection lines show; none for motions without them."""
+    of_joints = {joint: asdict(lines) for joint, lines in d.detection_lines.items()}
+    return {"detection_lines": of_joints} if of_joints else {}
 
 
 def _numbers(d: Diagnosis) -> dict[str, Any]:

@@ -4,6 +4,7 @@ from typing import Any
 
 from pipelines.contracts.verdict import Verdict
 from pipelines.report.sections.error_budget import torque_unit
+from pipelines.wording import detection_lines
 from pipelines.wording.findings import PARTS, Shares, outcomes, rows, searched_runs, shares
 
 
@@ -18,6 +19,19 @@ def decision(verdict: Verdict) -> dict[str, Any] | None:
         "rows": rows(verdict),
         "splits": [_split(verdict, one) for one in shares(verdict)],
         "searched": searched_runs(verdict),
+        "lines": _lines(verdict),
+    }
+
+
+def _lines(verdict: Verdict) -> dict[str, Any] | None:
+    """Return the table of what detection lines show; None for motions without them."""
+    if not verdict.detection_lines:
+        return None
+    table = detection_lines
+    return {
+        "headings": table.HEADINGS,
+        "rows": table.rows(verdict),
+        "notes": table.notes(verdict),
     }
 
 

@@ -23,6 +23,9 @@ def excitation(session: Session, artifact: Artifact) -> dict[str, Any]:
         base_hz = about["omega_rad_s"] / (2 * pi)
         facts.insert(0, f"{len(about['a'][0])} harmonics of {digits(base_hz)} Hz")
     stated = (about.get("standard_errors") or {}).items()
+    if empty := about.get("detection_lines"):
+        odd = sum(line % 2 for line in empty)
+        facts.insert(1, f"{odd} odd and {len(empty) - odd} even detection lines left empty")
     return {
         "file": session.shown(artifact.path),
         "about": ", ".join(facts),

@@ -6,7 +6,15 @@ from matplotlib import pyplot as plt
 
 from pipelines.contracts.verdict import Verdict
 from pipelines.diagnosis.diagnosis import Diagnosis
-from pipelines.diagnosis.verdict.figures import budget, decision, dependence, simulation, verdict
+from pipelines.diagnosis.verdict.figures import (
+    WITH_DETECTION_LINES,
+    budget,
+    decision,
+    dependence,
+    detection_lines,
+    simulation,
+    verdict,
+)
 from pipelines.plotting.style import STYLE, save
 
 DRAWN_BY = {
@@ -26,3 +34,5 @@ def draw(d: Diagnosis, checked: Verdict, folder: Path) -> None:
             # Those of many panels are for the screen: a PDF of each takes as long as all others.
             on_screen = name in ("simulation", "dependence")
             save(figure(d, checked), folder / name, ("png",) if on_screen else ("png", "pdf"))
+        if checked.detection_lines:
+            save(detection_lines.figure(d, checked), folder / WITH_DETECTION_LINES)
