@@ -100,7 +100,7 @@ class Separation:
             for one, before, shown in zip(own, known, seen, strict=True)
         ]
         if earlier:
-            # What diagnosed runs showed beside a truth is in part background, and shows again.
+            # What diagnosed runs showed and a truth lacks is in part background, and shows again.
             truths = [
                 one + is_planned * (earlier.background_of(before, shown) @ weighted.background.T)
                 for one, before, shown in zip(truths, known, seen, strict=True)

@@ -63,7 +63,8 @@ def undecided_pairs(usual: Trajectory) -> Iterator[tuple[Rival, Rival]]:
 
 def truth_of(rivals: tuple[Rival, Rival], number: int, usual: Trajectory) -> Term:
     """Return a rival as large as predictions take it, at the middle one of its shapes."""
-    found = sized(rivals, RUNS.problem(usual, [one.effect for one in rivals]))[number]
+    problem = RUNS.problem(usual, [one.effect for one in rivals])
+    found = sized(rivals, problem, RUNS.settings.bounds)[number]
     middle = found.truths[len(found.truths) // 2]
     candidate, amplitude = middle.candidate, middle.factor
     shape = np.array(candidate.shapes[0])

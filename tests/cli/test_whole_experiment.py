@@ -21,7 +21,7 @@ CHANGES = {
     # Not seconds: a busy machine would find another motion.
     "iterations = 800 ": "iterations = 50 ",
     "base_frequency_hz = 0.1 ": "base_frequency_hz = 0.2 ",
-    "harmonics = 5\n": "harmonics = 3\n",
+    "harmonics = 5 ": "harmonics = 3 ",
     'rig = "rigs/default.toml"': 'rig = "rigs/plain.toml"',
     "duration_s = 40.0\n": "duration_s = 10.0\n",
     "\nsample_rate_hz = 200.0\n": "\nsample_rate_hz = 100.0\n",

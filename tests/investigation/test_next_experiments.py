@@ -1,6 +1,5 @@
 """What would end a doubt: motions where they can, tests by hand where no motion can."""
 
-
 import numpy as np
 import pytest
 
