@@ -98,7 +98,7 @@ def _rivals(finding: Finding, posterior: Posterior, named: set[str]) -> dict[str
     if finding.level != "cause":
         return rivals
     rest = 1.0 - finding.probability
-    # A law that is more probable than the rest is there as well, and not in the place of the finding.
+    # A law that is more probable than the rest is there as well, and not in the finding's place.
     # A few sets have both.
     laws = {label: p for label, p in posterior.laws.items() if CLOSE <= p <= rest + CLOSE}
     rivals |= {label: p for label, p in laws.items() if can_be_planned(label)}

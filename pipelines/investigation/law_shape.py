@@ -11,14 +11,14 @@ from pipelines.diagnosis.detectability.detection_problem import DetectionProblem
 from pipelines.settings.design import JointBounds
 from pipelines.wording.law import LAWS, kind_and_joint
 
-CURVES_OF_TIME = "time"
-"""Family of the laws that no motion shows better than another."""
+NO_FUNCTIONS = ("time", "sensor")
+"""Families of the laws that are no function of the motion, so that no motion shows them better."""
 
 
 def can_be_planned(label: str) -> bool:
-    """Return whether a motion shows a law: it is a function of the motion, and no time or tone."""
+    """Return whether a law is a function of the motion."""
     kind, _ = kind_and_joint(label)
-    return kind in LAWS and LAWS[kind][0] not in (CURVES_OF_TIME, "sensor")
+    return kind in LAWS and LAWS[kind][0] not in NO_FUNCTIONS
 
 
 # A shape is a key by its identity: arrays have no hash.
