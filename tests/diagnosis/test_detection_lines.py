@@ -9,6 +9,7 @@ from matplotlib import pyplot as plt
 from scipy.signal import lfilter
 from scipy.stats import binom
 
+from exoid_cli.console import console
 from exoid_cli.verdict_view import show_verdict
 from pipelines.contracts.joints import HIP_AND_KNEE
 from pipelines.contracts.table import Table
@@ -209,6 +210,7 @@ def test_a_verdict_has_the_lines_of_each_joint_and_others_lack_the_key(capsys):
     table = rows(checked)
     assert all(len(row) == len(HEADINGS) for row in table)
     assert any(row[0] == "knee, p-value" for row in table)
+    console.reset()
     show_verdict(checked, HIP_AND_KNEE)
     shown = " ".join(capsys.readouterr().out.split())
     assert "what repeats at the lines of the motion" in shown
