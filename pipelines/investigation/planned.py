@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pipelines.contracts.verdict import Verdict
 from pipelines.diagnosis.detectability.detectability import by_noise, usual_candidates
@@ -40,6 +41,8 @@ class PlannedRuns:
     diagnosed_kinds: tuple[str, ...] = ()
     background: tuple[Trace, ...] = ()
     """What even a good rig has of each cause."""
+    diagnosed_background: tuple[list[NDArray], ...] = ()
+    """Torque of each trace in the diagnosed runs, which is the same with any further motion."""
 
     def as_in_verdict(self, verdict: Verdict, file: Path) -> "PlannedRuns":
         """Return runs of the kinds, and with the noise, of a verdict in some file.
@@ -59,8 +62,13 @@ class PlannedRuns:
         return replace(self, diagnosed=tuple(motions), diagnosed_kinds=self.kinds)
 
     def behind_background(self, problem: DetectionProblem) -> "PlannedRuns":
-        """Return runs of a rig that has a little of each cause, at the shape usual in a problem."""
-        return replace(self, background=traces_of(usual_candidates(by_noise(problem)), problem))
+        """Return runs of a rig that has a little of each cause.
+
+        Shapes and sizes are those usual in a problem: that of the diagnosed runs, if any.
+        """
+        traces = traces_of(usual_candidates(by_noise(problem)), problem)
+        known = tuple(trace.torque(problem) for trace in traces) if self.diagnosed else ()
+        return replace(self, background=traces, diagnosed_background=known)
 
     def problem(self, motion: Trajectory, effects: Sequence[Effect]) -> DetectionProblem:
         """Return the detection problem of the diagnosed runs, if any, and those with a motion.
@@ -105,14 +113,13 @@ class PlannedRuns:
         floor = replace(floor, rms=rms, independent_share=repeats * floor.independent_share)
         problem = DetectionProblem.of([at_block_rate(run) for run in observed], baseline, floor)
         # One period does not show what changes over several ones.
-        return with_background(
-            problem,
-            [
-                trace
-                for trace in self.background
-                if repeats == 1.0 or not _depends_on_time(trace.candidate.effect)
-            ],
-        )
+        shown = [
+            i
+            for i, trace in enumerate(self.background)
+            if repeats == 1.0 or not _depends_on_time(trace.candidate.effect)
+        ]
+        known = [self.diagnosed_background[i] for i in shown] if self.diagnosed_background else None
+        return with_background(problem, [self.background[i] for i in shown], known)
 
 
 def _depends_on_time(effect: Effect) -> bool:

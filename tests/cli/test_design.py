@@ -12,7 +12,7 @@ from pipelines.settings import datasets
 from tests.report.sessions import AXIS, decision_of, write_verdict
 
 PUBLISHED = str(datasets() / "paper" / "trajectory.toml")
-QUICK = "[design]\nharmonics = 2\nparticles = 16\niterations = 25\nseed = 4\n"
+QUICK = "[design]\nharmonics = 2\nparticles = 16\niterations = 25\nseed = 4\nseconds = 15.0\n"
 
 
 @pytest.fixture

@@ -14,7 +14,7 @@ from pipelines.mechanics.machine import THE_LEG
 from pipelines.settings.design import DesignSettings
 from pipelines.settings.rig.plant import PlantSettings
 
-QUICK = DesignSettings(harmonics=3, particles=12, iterations=50)
+QUICK = DesignSettings(harmonics=3, particles=12, iterations=50, seconds=15.0)
 
 
 @pytest.fixture(scope="module")

@@ -23,7 +23,7 @@ from pipelines.settings.design import DesignSettings
 from pipelines.settings.rig.plant import PlantSettings
 from tests.report.sessions import AXIS, decision_of, write_verdict
 
-QUICK = DesignSettings(harmonics=3, particles=24, iterations=50)
+QUICK = DesignSettings(harmonics=3, particles=24, iterations=50, seconds=15.0)
 RUNS = PlannedRuns(QUICK, PlantSettings())
 EASY = ("parallel_spring@knee", "rotor_inertia@knee")
 HARD = ("mass_off_axis@hip", "torque_offset@hip")
@@ -89,7 +89,7 @@ def test_a_design_decides_what_the_usual_excitation_leaves_open(usual):
 
 
 def test_equal_settings_give_an_equal_excitation(usual):
-    quick = replace(RUNS, settings=QUICK.changed(harmonics=1, particles=4))
+    quick = replace(RUNS, settings=QUICK.changed(harmonics=1, particles=4, seconds=60.0))
     one, again = (
         separating_design(question(usual, *HARD, runs=quick), Geometry(), usual).design.trajectory
         for _ in range(2)
@@ -314,3 +314,11 @@ def test_weighted_rows_have_a_weighted_background(usual):
     problem = question(usual, *EASY).runs.problem(usual, [])
     halved = problem.weighted(np.full(4, 0.25))
     assert halved.background == pytest.approx(0.5 * problem.background, abs=1e-9)
+
+
+def test_the_background_of_diagnosed_runs_is_the_same_whether_it_was_computed_before(usual):
+    runs = SeparationProblem.of(named(*EASY), RUNS.after([usual]), usual).runs
+    motion = replace(usual, a=usual.b, b=usual.a)
+    effects = [one.effect for one in named(*EASY)]
+    anew = replace(runs, diagnosed_background=()).problem(motion, effects).background
+    assert runs.problem(motion, effects).background == pytest.approx(anew, abs=1e-4 * anew.max())

@@ -41,29 +41,53 @@ class Trace(NamedTuple):
     """A little of a cause, as a good rig has it."""
 
     candidate: Candidate
-    size: float
-    """Standard deviation of the first amplitude, or of the torque over that at the shape."""
+    linear: NDArray
+    """(k,) one standard deviation of its amplitudes, which go together; of one that transforms the
+    motion, of the torque over that at the shape."""
+
+    def torque(self, problem: DetectionProblem) -> list[NDArray]:
+        """Return its torque, (m, O, 1) of each run."""
+        return [part @ self.linear[:, np.newaxis] for part in parts_of(self.candidate, problem)]
 
 
 def traces_of(candidates: Iterable[Candidate], problem: DetectionProblem) -> tuple[Trace, ...]:
     """Return what a good rig has of some candidates: shares of its torque in a problem's runs."""
     traces = []
     for candidate in candidates:
-        effect = candidate.effect
-        rms = problem.rms(effect, unit_torque(candidate, parts_of(candidate, problem), problem))
+        effect, parts = candidate.effect, parts_of(candidate, problem)
+        unit = unit_torque(candidate, parts, problem)
+        rms = problem.rms(effect, unit)
         # Of one that makes no torque in these runs no share is known.
         if rms > 0.0:
             share = CRITERIA.background_cause * float(problem.torque_rms[problem.joint(effect)])
-            traces.append(Trace(candidate, share / rms))
+            A, y = (
+                np.concatenate([c[run.usable] for run, c in zip(problem.runs, of, strict=True)])
+                for of in (parts, unit)
+            )
+            traces.append(Trace(candidate, share / rms * np.linalg.lstsq(A, y[:, 0])[0]))
     return tuple(traces)
 
 
-def with_background(problem: DetectionProblem, traces: Sequence[Trace]) -> DetectionProblem:
-    """Return a problem with the background of a good rig."""
-    columns = []
-    for candidate, size in traces:
-        torque = unit_torque(candidate, parts_of(candidate, problem), problem)
-        columns.append(size * problem.remainder(torque)[:, 0])
+def with_background(
+    problem: DetectionProblem,
+    traces: Sequence[Trace],
+    known: Sequence[Sequence[NDArray]] | None = None,
+) -> DetectionProblem:
+    """Return a problem with the background of a good rig.
+
+    Parameters
+    ----------
+    problem : DetectionProblem
+    traces : sequence of Trace
+    known : sequence of sequences of (m, O, 1) arrays, optional
+        Torque of each trace in the first runs, where it was computed before.
+    """
+    first = len(known[0]) if known else 0
+    others = replace(problem, runs=problem.runs[first:], untouched=problem.untouched[first:])
+    columns = [
+        problem.remainder([*(known[i] if known else ()), *trace.torque(others)])[:, 0]
+        for i, trace in enumerate(traces)
+    ]
     return replace(problem, background=np.array(columns).T) if columns else problem
 
 
