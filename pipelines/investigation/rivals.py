@@ -104,8 +104,11 @@ def rivals_in_verdict(verdict: Verdict, file: Path, machine: Machine) -> list[Ri
         for cause in verdict.causes
         if not cause.per_run
     }
+    # Rivals exclude each other. Probabilities of those that a few sets have together exceed one.
+    total = max(1.0, sum(doubt.probabilities.values()))
     rivals = []
-    for label, probability in doubt.probabilities.items():
+    for label, unscaled in doubt.probabilities.items():
+        probability = unscaled / total
         if label == NOTHING or label.startswith(LAW):
             rivals.append(Rival(None, probability, law=None if label == NOTHING else label))
             continue
