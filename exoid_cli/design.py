@@ -150,8 +150,9 @@ def _design(
     if empty := result.detection_lines:
         odd = sum(line % 2 for line in empty)
         harmonics = (
-            f"{settings.harmonics - len(empty)} odd harmonics up to {settings.harmonics}, {odd} odd"
-            f" and {len(empty) - odd} even detection lines"
+            f"{settings.harmonics - len(empty)} odd harmonics up to"
+            f" {max(result.trajectory.excited_lines)}, {odd} odd and {len(empty) - odd} even"
+            f" detection lines up to {max(empty)}"
         )
     console.say(
         f"\n{output}: {criterion_text(settings, result.quality)}, {harmonics}, period"

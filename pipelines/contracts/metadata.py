@@ -114,7 +114,7 @@ class RunKeys(TableKeys):
     period_s: Positive | None = None
     # Numbers of the harmonics of 1/period_s that the motion excites, where detection lines are left
     # empty: all are odd, and every other harmonic is a detection line.
-    excited_lines: Annotated[list[Annotated[int, Field(gt=0)]], Field(min_length=1)] | None = None
+    excited_lines: list[Annotated[int, Field(gt=0)]] | None = None
     rig: str | None = None
     subject: str | None = None
     session: str | None = None
@@ -127,3 +127,14 @@ class RunKeys(TableKeys):
     latency: Latency | None = None
     controller: dict[str, Controller] | None = None
     geometry: Geometry | None = None
+
+    @field_validator("excited_lines")
+    @classmethod
+    def _lines_are_odd(cls, lines: list[int] | None) -> list[int] | None:
+        # With an even line, an odd distortion has even lines too, and would be called even.
+        if lines is not None and (not lines or any(line % 2 == 0 for line in lines)):
+            raise ValueError(
+                f"found {lines}, expected odd numbers, or no key where the motion has no detection"
+                " lines"
+            )
+        return lines

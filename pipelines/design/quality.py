@@ -109,15 +109,17 @@ def crest_factor(trajectory: Trajectory, bounds: JointBounds) -> float:
     Returns
     -------
     float
-        Of the joint where it is larger; NaN if a joint is at rest.
+        Of the joint where it is larger, among those that move; NaN if none does.
     """
     span, samples = trajectory.period_s or trajectory.duration_s, 1000
     states = np.array(trajectory.at(np.arange(samples) * span / samples))
     half = 0.5 * np.ptp(bounds_array(bounds), axis=2)
     rms = states.std(axis=1) / half
     peak = 0.5 * np.ptp(trajectory.extrema(), axis=2) / half
-    with np.errstate(invalid="ignore"):
-        return float(np.max(peak.max(axis=0) / rms.max(axis=0)))
+    # The rms of a joint at rest is rounding, and may be zero.
+    moves = peak.max(axis=0) > 0.0
+    crest = peak.max(axis=0)[moves] / rms.max(axis=0)[moves]
+    return float(crest.max()) if moves.any() else np.nan
 
 
 def regressor(trajectory: Trajectory, geometry: Geometry, time: NDArray) -> NDArray:

@@ -34,7 +34,9 @@ class Doubt:
     state: State
     words: str
     probabilities: dict[str, float] = field(default_factory=dict)
-    """Of the rivals by their labels, if the state is open; in all at most one."""
+    """Of the rivals by their labels, if the state is open.
+
+    Their sum may exceed one where a set of causes has two of them."""
 
 
 def doubt_of(verdict: Verdict) -> Doubt:
@@ -69,7 +71,8 @@ def _open(rivals: dict[str, float]) -> Doubt:
 
 def _with_law(words: str) -> Doubt:
     return Doubt(
-        State.UNLISTED, f"open: {words}, or an unlisted law, which no motion can be planned for"
+        State.UNLISTED,
+        f"open: {words}, or an unlisted law; no motion can be planned to decide that",
     )
 
 

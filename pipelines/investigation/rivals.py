@@ -7,11 +7,11 @@ from pathlib import Path
 from pipelines.contracts.verdict import Verdict
 from pipelines.effects import Effect
 from pipelines.errors import InputError, about
-from pipelines.investigation.doubt import doubt_of
+from pipelines.investigation.doubt import CLOSE, doubt_of
 from pipelines.mechanics.machine import Machine
 from pipelines.model import Term, term_from
 from pipelines.wording.label import NOTHING, cause_at
-from pipelines.wording.law import LAW
+from pipelines.wording.law import ACROSS_JOINTS, LAW, LAWS, UNLISTED, kind_and_joint, law_label
 
 SETTING = "--separate"
 
@@ -91,6 +91,7 @@ def rivals_in_verdict(verdict: Verdict, file: Path, machine: Machine) -> list[Ri
     ContractError
         Where a cause has values that it cannot have.
     """
+    _refuse_unknown_laws(verdict, file, machine)
     doubt = doubt_of(verdict)
     if not doubt.probabilities:
         raise InputError(
@@ -103,8 +104,11 @@ def rivals_in_verdict(verdict: Verdict, file: Path, machine: Machine) -> list[Ri
         for cause in verdict.causes
         if not cause.per_run
     }
+    # Rivals exclude each other. Probabilities of those that a few sets have together exceed one.
+    total = max(1.0, sum(doubt.probabilities.values()))
     rivals = []
-    for label, probability in doubt.probabilities.items():
+    for label, unscaled in doubt.probabilities.items():
+        probability = unscaled / total
         if label == NOTHING or label.startswith(LAW):
             rivals.append(Rival(None, probability, law=None if label == NOTHING else label))
             continue
@@ -116,3 +120,28 @@ def rivals_in_verdict(verdict: Verdict, file: Path, machine: Machine) -> list[Ri
     # Without a fitted cause it is not known which torque a law has.
     is_known = any(rival.term for rival in rivals)
     return [rival for rival in rivals if is_known or not rival.law]
+
+
+def _refuse_unknown_laws(verdict: Verdict, file: Path, machine: Machine) -> None:
+    """Refuse a law that the machine cannot have.
+
+    It has no torque, so that it would count as a rival that each motion excludes.
+
+    Raises
+    ------
+    InputError
+        With its label, where it is probable enough to be a rival.
+    """
+    laws = verdict.posterior.laws if verdict.posterior else {}
+    joints = [joint.name for joint in machine.joints]
+    for label in (label for label, p in laws.items() if p >= CLOSE):
+        kind, joint = kind_and_joint(label)
+        # Its name alone is that of a listed cause's family, and no motion is planned for it.
+        if kind.startswith(UNLISTED):
+            continue
+        is_place = joint is None if kind == ACROSS_JOINTS else joint in joints
+        if kind not in LAWS or not is_place or label != law_label(kind, joint):
+            raise InputError(
+                f"{file}: posterior.laws: found {label}, expected a law of {' or '.join(joints)},"
+                f" such as {law_label('angle', joints[0])}; run `exoid diagnose` again"
+            )

@@ -105,6 +105,17 @@ class DesignSettings(Settings):
         return self
 
     @model_validator(mode="after")
+    def _samples_show_the_highest_harmonic(self) -> Self:
+        highest_hz = self.harmonics * self.base_frequency_hz
+        if highest_hz >= 0.5 * self.sample_rate_hz:
+            raise ValueError(
+                f"harmonics: the highest, {self.harmonics}, is at {highest_hz:g} Hz, expected less"
+                f" than half of sample_rate_hz, {0.5 * self.sample_rate_hz:g} Hz; lower harmonics"
+                " or base_frequency_hz"
+            )
+        return self
+
+    @model_validator(mode="after")
     def _multisine_is_never_at_rest(self) -> Self:
         if self.rest_to_rest and self.criterion == "multisine":
             raise ValueError(

@@ -7,6 +7,8 @@ LAW = "law:"
 """Prefix of the label of an unlisted law."""
 UNLISTED = "unlisted_"
 """Prefix of the kind of an unlisted effect that resembles a listed cause, before its family."""
+ACROSS_JOINTS = "across_joints"
+"""The kind that acts at both joints at once, so that its label has no joint."""
 LAWS = {
     "angle": ("angle", "a law of {joint}'s angle"),
     "other_angle": ("angle", "a law of the other joint's angle at {joint}"),
@@ -26,7 +28,7 @@ LAWS = {
     "time": ("time", "a torque of {joint} that wanders in time and does not repeat"),
     "hum": ("time", "a tone at {joint} that does not follow the motion"),
     "bursts": ("time", "a torque at {joint} that comes in bursts and does not repeat"),
-    "across_joints": ("angle", "an elastic torque across both joints"),
+    ACROSS_JOINTS: ("angle", "an elastic torque across both joints"),
     "quantisation": ("sensor", "a torque of {joint} that is reported in coarse steps"),
 }
 """Family and wording of each kind of smooth law."""

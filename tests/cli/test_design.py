@@ -82,8 +82,8 @@ def test_a_multisine_says_how_many_lines_it_has_and_which_runs_cut_a_period(tmp_
     captured = capsys.readouterr()
     value = TRAJECTORY.read(out).metadata["criterion_value"]
     assert " ".join(captured.out.split()).endswith(
-        f"{out}: crest factor {value:.4g}, 4 odd harmonics up to 12, 2 odd and 6 even detection"
-        " lines, period 20 s, seed 1; stopped by stagnation"
+        f"{out}: crest factor {value:.4g}, 4 odd harmonics up to 11, 2 odd and 6 even"
+        " detection lines up to 12, period 20 s, seed 1; stopped by stagnation"
     )
     assert "run cut lasts 30 s, 1.5 periods" in " ".join(captured.err.split())
     assert "run whole" not in captured.err

@@ -151,6 +151,13 @@ def test_what_is_no_parquet_file_is_refused(tmp_path, content, text):
     assert refusal(RECORDING.read, path) == f"{path}: {text}"
 
 
+@pytest.mark.parametrize("lines", [[], [2, 4], [1, 3, 10]])
+def test_excited_lines_that_are_not_odd_are_refused(tmp_path, swinging_leg, run_metadata, lines):
+    metadata = {**run_metadata, "excited_lines": lines}
+    with pytest.raises(ContractError, match=r"excited_lines: found \[.*\], expected odd numbers"):
+        RECORDING.write(tmp_path / "a.parquet", swinging_leg, metadata)
+
+
 def test_a_file_cut_short_anywhere_is_refused(tmp_path, swinging_leg, run_metadata):
     RECORDING.write(tmp_path / "a.parquet", swinging_leg, run_metadata)
     whole = (tmp_path / "a.parquet").read_bytes()

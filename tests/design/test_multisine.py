@@ -130,6 +130,13 @@ def test_a_sine_has_the_crest_factor_root_two():
     assert crest_factor(sine, SLOW.bounds) == pytest.approx(np.sqrt(2.0), rel=1e-4)
 
 
+@pytest.mark.parametrize("knee_rad", [0.0, -0.9])
+def test_a_joint_at_rest_has_no_part_in_the_crest_factor(knee_rad):
+    a = np.array([[0.3], [0.0]])
+    sine = FourierTrajectory(np.array([0.6, knee_rad]), a, np.zeros((2, 1)), 2.0)
+    assert crest_factor(sine, SLOW.bounds) == pytest.approx(np.sqrt(2.0), rel=1e-4)
+
+
 def test_the_crest_factor_does_not_depend_on_the_scale_of_a_motion(slow):
     motion = slow.trajectory
     half = FourierTrajectory(motion.theta0, 0.5 * motion.a, 0.5 * motion.b, motion.omega)

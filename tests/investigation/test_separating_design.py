@@ -288,6 +288,38 @@ def test_a_verdict_s_ties_are_rivals_with_its_probabilities_and_noise(tmp_path):
     assert planned.kinds == tuple(found.runs)
 
 
+@pytest.mark.parametrize(
+    "law",
+    [
+        "law:angle@elbow",
+        "law:nonsense@hip",
+        "law:angle",
+        "law:across_joints@hip",
+        "law:angle@hip/x",
+    ],
+)
+def test_a_law_that_the_machine_cannot_have_is_refused(tmp_path, law):
+    write_verdict(tmp_path, **decision_of(ties=()))
+    file = tmp_path / "diagnosed" / "verdict.json"
+    document = json.loads(file.read_text())
+    document["posterior"]["laws"][law] = 0.06
+    file.write_text(json.dumps(document))
+    with pytest.raises(InputError, match=rf"laws: found {law}, expected a law of hip or knee"):
+        rivals_in_verdict(read(file), file, THE_LEG)
+
+
+def test_rivals_that_may_be_there_together_are_at_most_certain(tmp_path):
+    write_verdict(tmp_path, **decision_of())
+    file = tmp_path / "diagnosed" / "verdict.json"
+    document = json.loads(file.read_text())
+    for cause in document["findings"][0]["causes"]:
+        cause["probability"] = 0.75
+    document["causes"] = []
+    file.write_text(json.dumps(document))
+    rivals = rivals_in_verdict(read(file), file, THE_LEG)
+    assert [one.probability for one in rivals] == pytest.approx([0.5, 0.5])
+
+
 def test_a_verdict_without_a_choice_or_of_another_machine_is_refused(tmp_path):
     write_verdict(tmp_path, **decision_of(ties=()))
     file = tmp_path / "diagnosed" / "verdict.json"

@@ -102,6 +102,13 @@ def test_every_key_of_a_rig_file_has_a_description():
             " 'scaled_condition' or 'multisine'",
         ),
         (
+            "[design]\nbase_frequency_hz = 20.0\nharmonics = 5\n",
+            (
+                "design: harmonics: the highest, 5, is at 100 Hz, expected less than half of"
+                " sample_rate_hz, 100 Hz; lower harmonics or base_frequency_hz"
+            ),
+        ),
+        (
             "[design.bounds.hip]\nangle_rad = [1.0, 0.5]\n",
             (
                 "design.bounds.hip: angle_rad: found [1.0, 0.5], expected the lowest angle first;"
