@@ -42,7 +42,11 @@ class ByClass:
 
 @dataclass(frozen=True)
 class JointDetectionLines:
-    """Noise and distortion of one joint's torque; all rms up to ``highest_hz``, N·m."""
+    """Noise and distortion of one joint's torque, N·m.
+
+    Measured and predicted rms are up to ``highest_hz``; those of the residual are up to the highest
+    line that its samples away from reversals determine, which is lower.
+    """
 
     runs: int
     periods: int
