@@ -240,16 +240,19 @@ class Diagnosis:
     @cached_property
     def detection_lines(self) -> dict[str, JointDetectionLines]:
         """What detection lines show at each joint; empty for motions without them."""
-        if self.data.spoilt:
+        runs = (*self.fitted_runs, *self.validate)
+        # Other recordings need no residuals of all runs.
+        if self.data.spoilt or not any(run.motion.metadata.get("excited_lines") for run in runs):
             return {}
-        joints = zip(self.baseline.joints, detection_lines(*self._all_residuals()), strict=True)
+        joints = zip(self.baseline.joints, detection_lines(*self._all_residuals), strict=True)
         return {joint: lines for joint, lines in joints if lines is not None}
 
     def line_spectrum(self, joint: str) -> LineSpectrum | None:
         """Return the spectrum of a joint's torque; None for motions without detection lines."""
-        runs, residuals, _ = self._all_residuals()
+        runs, residuals, _ = self._all_residuals
         return line_spectrum(runs, residuals, self.baseline.joints.index(joint))
 
+    @cached_property
     def _all_residuals(self) -> tuple[list[Run], list[NDArray], list[NDArray] | None]:
         """Return the fitted and the validation runs, with both models' residuals (m, O) N·m.
 

@@ -28,6 +28,8 @@ class LawShape:
 
     label: str
     spans: Spans
+    typical: NDArray
+    """(k,) standard deviation of the amplitude of each function before any data."""
 
     @classmethod
     def of(cls, label: str, problem: DetectionProblem, bounds: JointBounds) -> "LawShape":
@@ -35,8 +37,12 @@ class LawShape:
 
         A function of the diagnosed angles alone would say anything beyond them.
         """
-        joints = problem.runs[0].state[0].shape[1]
+        run = problem.runs[0]
+        joints = run.state[0].shape[1]
         spans = Spans.of(problem.runs, problem.torque_rms[:joints])
+        laws, _ = smooth_laws(run, spans, np.zeros((len(run.time), joints)))
+        own = [law for law in laws if law.variant(run.motion.joints) == label]
+        variance = np.array([law.variance for law in own])
         low, high = np.transpose([bounds.hip.angle_rad, bounds.knee.angle_rad])
         half = 0.5 * (high - low)
         return cls(
@@ -48,6 +54,7 @@ class LawShape:
                 sum_middle=0.5 * float((high + low).sum()),
                 sum_half_range=float(half.sum()),
             ),
+            max(CRITERIA.amplitudes) * np.sqrt(variance / variance.sum()),
         )
 
     def parts(self, problem: DetectionProblem) -> list[NDArray]:
@@ -60,11 +67,3 @@ class LawShape:
             drives = values[:, :, own] * self.spans.torque[:, np.newaxis]
             parts.append(np.concatenate([drives, np.zeros_like(drives)], axis=1))
         return parts
-
-    def typical(self, problem: DetectionProblem) -> NDArray:
-        """Return a standard deviation of each amplitude before any data, (k,)."""
-        run, joints = problem.runs[0], len(self.spans.torque)
-        laws, _ = smooth_laws(run, self.spans, np.zeros((len(run.time), joints)))
-        own = [law for law in laws if law.variant(run.motion.joints) == self.label]
-        variance = np.array([law.variance for law in own])
-        return np.asarray(max(CRITERIA.amplitudes) * np.sqrt(variance / variance.sum()))

@@ -5,7 +5,6 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pipelines.contracts.verdict import Verdict
 from pipelines.diagnosis.detectability.detectability import by_noise, usual_candidates
@@ -41,8 +40,6 @@ class PlannedRuns:
     diagnosed_kinds: tuple[str, ...] = ()
     background: tuple[Trace, ...] = ()
     """What even a good rig has of each cause."""
-    diagnosed_background: tuple[list[NDArray], ...] = ()
-    """Torque of each trace in the diagnosed runs, which is the same with any further motion."""
 
     def as_in_verdict(self, verdict: Verdict, file: Path) -> "PlannedRuns":
         """Return runs of the kinds, and with the noise, of a verdict in some file.
@@ -67,8 +64,10 @@ class PlannedRuns:
         Shapes and sizes are those usual in a problem: that of the diagnosed runs, if any.
         """
         traces = traces_of(usual_candidates(by_noise(problem)), problem)
-        known = tuple(trace.torque(problem) for trace in traces) if self.diagnosed else ()
-        return replace(self, background=traces, diagnosed_background=known)
+        if self.diagnosed:
+            # In these runs it is the same with any further motion.
+            traces = tuple(trace.known_in(problem) for trace in traces)
+        return replace(self, background=traces)
 
     def problem(self, motion: Trajectory, effects: Sequence[Effect]) -> DetectionProblem:
         """Return the detection problem of the diagnosed runs, if any, and those with a motion.
@@ -113,13 +112,12 @@ class PlannedRuns:
         floor = replace(floor, rms=rms, independent_share=repeats * floor.independent_share)
         problem = DetectionProblem.of([at_block_rate(run) for run in observed], baseline, floor)
         # One period does not show what changes over several ones.
-        shown = [
-            i
-            for i, trace in enumerate(self.background)
+        shown = (
+            trace
+            for trace in self.background
             if repeats == 1.0 or not _depends_on_time(trace.candidate.effect)
-        ]
-        known = [self.diagnosed_background[i] for i in shown] if self.diagnosed_background else None
-        return with_background(problem, [self.background[i] for i in shown], known)
+        )
+        return with_background(problem, shown)
 
 
 def _depends_on_time(effect: Effect) -> bool:

@@ -31,9 +31,10 @@ class SeparationProblem:
             Where such runs cannot show a rival.
         """
         effects = effects_of(rivals)
-        runs = runs.behind_background(
-            runs.diagnosed_problem(effects) if runs.diagnosed else runs.problem(last, effects)
-        )
+        if not runs.background:
+            runs = runs.behind_background(
+                runs.diagnosed_problem(effects) if runs.diagnosed else runs.problem(last, effects)
+            )
         bounds = runs.settings.bounds
         if not runs.diagnosed:
             return cls(tuple(sized(rivals, runs.problem(last, effects), bounds)), runs, None)

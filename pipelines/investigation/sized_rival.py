@@ -75,7 +75,7 @@ class Appearance:
     def of(cls, candidate: Shape, parts: list[NDArray], problem: DetectionProblem) -> "Appearance":
         """Compute it for a shape and its parts, (m, O, k) of each planned or recorded run."""
         if isinstance(candidate, LawShape):
-            parts = [part * candidate.typical(problem) for part in parts]
+            parts = [part * candidate.typical for part in parts]
         else:
             if not candidate.transforms_motion:
                 own = candidate.columns_in([run.motion.run for run in problem.runs])
@@ -206,15 +206,15 @@ def _sized(
     if rival.effect is None:
         return SizedRival(rival, (), ())
     grid = list(shapes_of(rival.effect, problem.runs))
-    if rival.term is not None and seen is not None:
-        own = _candidate(rival.term, problem)
-        truths, grid = _as_seen([own], seen, problem), [own, *grid]
-    elif seen is not None:
-        truths = _as_seen(grid, seen, problem)
-    else:
+    if seen is None:
         # A shape that these runs do not show has no size.
         sizes = ((one, _factor(one, length, problem)) for one in grid)
         truths = [Truth(one, factor) for one, factor in sizes if np.isfinite(factor)]
+    elif rival.term is not None:
+        own = _candidate(rival.term, problem)
+        truths, grid = _as_seen([own], seen, problem), [own, *grid]
+    else:
+        truths = _as_seen(grid, seen, problem)
     if not truths:
         raise InputError(
             f"{rival.label} makes no torque with the last excitation; give `exoid design"
@@ -231,7 +231,7 @@ def _as_seen(grid: Sequence[Shape], seen: NDArray, problem: DetectionProblem) ->
     shown = problem.whitened(seen)
     for candidate in grid:
         columns = problem.whitened(problem.remainder(parts_in(problem, candidate)))
-        gram = columns.T @ columns + np.diag(1.0 / _typical(candidate, problem) ** 2)
+        gram = columns.T @ columns + np.diag(1.0 / _typical(candidate) ** 2)
         if not columns.any():
             continue
         linear = np.linalg.solve(gram, columns.T @ shown)
@@ -242,10 +242,10 @@ def _as_seen(grid: Sequence[Shape], seen: NDArray, problem: DetectionProblem) ->
     return [one for own, gain in pairs if gain >= best - tolerance for one in own]
 
 
-def _typical(candidate: Shape, problem: DetectionProblem) -> NDArray:
+def _typical(candidate: Shape) -> NDArray:
     """Return a standard deviation of each amplitude before any data, (k,); two are typical."""
     if isinstance(candidate, LawShape):
-        return candidate.typical(problem)
+        return candidate.typical
     if candidate.transforms_motion:
         return np.ones(1)  # of the size at which the shape is
     return np.array([0.5 * np.max(np.abs(p.typical)) for p in candidate.effect.linear])

@@ -54,9 +54,11 @@ def plain_effects() -> list[Effect]:
 
 def undecided_pairs(usual: Trajectory) -> Iterator[tuple[Rival, Rival]]:
     """Yield pairs of causes that the usual excitation leaves undecided, but another may not."""
+    # Once for all pairs.
+    runs = RUNS.behind_background(RUNS.problem(usual, []))
     for one, other in itertools.combinations(plain_effects(), 2):
         rivals = (Rival(one, 0.5), Rival(other, 0.5))
-        separated = SeparationProblem.of(rivals, RUNS, usual).with_motion(usual)
+        separated = SeparationProblem.of(rivals, runs, usual).with_motion(usual)
         if min(separated.as_json()["decided"]) < UNDECIDED and not separated.inseparable():
             yield rivals
 

@@ -30,7 +30,7 @@ def test_a_law_has_columns_of_its_own_joint(usual, kind):
     label = law_label(kind, None if kind == "across_joints" else "knee")
     law = LawShape.of(label, problem, QUICK.bounds)
     parts = law.parts(problem)
-    assert parts[0].shape[2] == len(law.typical(problem)) > 0
+    assert parts[0].shape[2] == len(law.typical) > 0
     assert np.abs(parts[0][:, 1]).max() > 0.0
     if kind != "across_joints":
         assert not parts[0][:, 0].any()

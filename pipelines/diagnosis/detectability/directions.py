@@ -44,10 +44,19 @@ class Trace(NamedTuple):
     linear: NDArray
     """(k,) one standard deviation of its amplitudes, which go together; of one that transforms the
     motion, of the torque over that at the shape."""
+    known: tuple[NDArray, ...] = ()
+    """(m, O, 1) its torque in the first runs of a problem, where it was computed before."""
 
     def torque(self, problem: DetectionProblem) -> list[NDArray]:
         """Return its torque, (m, O, 1) of each run."""
-        return [part @ self.linear[:, np.newaxis] for part in parts_of(self.candidate, problem)]
+        first = len(self.known)
+        others = replace(problem, runs=problem.runs[first:], untouched=problem.untouched[first:])
+        parts = parts_of(self.candidate, others)
+        return [*self.known, *(part @ self.linear[:, np.newaxis] for part in parts)]
+
+    def known_in(self, problem: DetectionProblem) -> "Trace":
+        """Return it with its torque in a problem's runs, which may be the first ones of others."""
+        return self._replace(known=tuple(self.torque(problem)))
 
 
 def traces_of(candidates: Iterable[Candidate], problem: DetectionProblem) -> tuple[Trace, ...]:
@@ -68,26 +77,9 @@ def traces_of(candidates: Iterable[Candidate], problem: DetectionProblem) -> tup
     return tuple(traces)
 
 
-def with_background(
-    problem: DetectionProblem,
-    traces: Sequence[Trace],
-    known: Sequence[Sequence[NDArray]] | None = None,
-) -> DetectionProblem:
-    """Return a problem with the background of a good rig.
-
-    Parameters
-    ----------
-    problem : DetectionProblem
-    traces : sequence of Trace
-    known : sequence of sequences of (m, O, 1) arrays, optional
-        Torque of each trace in the first runs, where it was computed before.
-    """
-    first = len(known[0]) if known else 0
-    others = replace(problem, runs=problem.runs[first:], untouched=problem.untouched[first:])
-    columns = [
-        problem.remainder([*(known[i] if known else ()), *trace.torque(others)])[:, 0]
-        for i, trace in enumerate(traces)
-    ]
+def with_background(problem: DetectionProblem, traces: Iterable[Trace]) -> DetectionProblem:
+    """Return a problem with the background of a good rig."""
+    columns = [problem.remainder(trace.torque(problem))[:, 0] for trace in traces]
     return replace(problem, background=np.array(columns).T) if columns else problem
 
 

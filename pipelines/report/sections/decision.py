@@ -27,11 +27,10 @@ def _lines(verdict: Verdict) -> dict[str, Any] | None:
     """Return the table of what detection lines show; None for motions without them."""
     if not verdict.detection_lines:
         return None
-    table = detection_lines
     return {
-        "headings": table.HEADINGS,
-        "rows": table.rows(verdict),
-        "notes": table.notes(verdict),
+        "headings": detection_lines.HEADINGS,
+        "rows": detection_lines.rows(verdict),
+        "notes": detection_lines.notes(verdict),
     }
 
 

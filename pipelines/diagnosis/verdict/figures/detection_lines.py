@@ -69,8 +69,5 @@ def _draw(axis: Axes, spectrum: LineSpectrum) -> None:
 
 def _result(lines: DetectionLines) -> str:
     """Return the test of the residual in words."""
-    p = ", ".join(
-        f"{words} {getattr(lines.p_value, name):.2g}"
-        for name, words in (("excited", "excited"), ("odd", "odd"), ("even", "even"))
-    )
+    p = ", ".join(f"{name} {getattr(lines.p_value, name):.2g}" for name in CLASSES)
     return f"p-value that the residual away from reversals is no more than noise: {p}"
